@@ -7,7 +7,7 @@
 #include <latch>
 #include <memory>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"

@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/rules/rule_runner.hpp"
 
 #include "support/components.hpp"

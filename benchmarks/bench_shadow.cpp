@@ -14,7 +14,7 @@
 #include <memory>
 #include <thread>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 #include "support/components.hpp"
 #include "support/micro.hpp"

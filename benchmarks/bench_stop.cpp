@@ -6,7 +6,7 @@
 #include <chrono>
 #include <thread>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"

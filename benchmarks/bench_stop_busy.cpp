@@ -7,7 +7,7 @@
 // thread: to the first instruction of who waited for it); and what was left of the work when it was asked.
 #include <thread>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 #include "support/components.hpp"
 #include "support/options.hpp"

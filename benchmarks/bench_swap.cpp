@@ -8,7 +8,7 @@
 // its phase.
 #include <array>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 #include "support/busy.hpp"
 #include "support/components.hpp"

@@ -2,7 +2,7 @@
 """Check the dependencies that no other tool sees.
 
 C++ includes point one way: kernel <- rules <- bindings, bridge; in the kernel a storey includes only those
-below it.
+below it. What waits, wakes or reads a clock is in the seam alone, which a build for tests can replace.
 Examples and benchmarks use what is public only: the headers <mauve_rt/*.hpp>, and of the Python package
 nothing whose name starts with an underscore. import-linter checks the layers inside the Python packages; it
 sees no compiled module.
@@ -69,6 +69,19 @@ UPWARD = {
     ("run/component_fallback.cpp", "mauve_rt/architecture/architecture.hpp"),
     ("run/component_fallback.cpp", "mauve_rt/architecture/plugin.hpp"),
 }
+
+# Here alone the kernel and the rules wait, wake, read a clock and make threads.
+SEAM = f"{KERNEL}/base/seam", f"{KERNEL}/include/mauve_rt/base/seam"
+OF_THE_SEAM = re.compile(
+    r"#\s*include\s*<(?:barrier|condition_variable|future|latch|linux/futex\.h|linux/membarrier\.h|mutex|poll\.h"
+    r"|semaphore|semaphore\.h|shared_mutex|stop_token|sys/epoll\.h|sys/eventfd\.h|sys/timerfd\.h|thread)>"
+    r"|\bstd::(?:(?:recursive_|shared_|timed_|recursive_timed_|shared_timed_)?mutex|condition_variable(?:_any)?"
+    r"|j?thread\b(?!::id)|async|call_once|this_thread::(?:sleep_\w+|yield)"
+    r"|chrono::(?:steady|system|high_resolution)_clock)\b"
+    r"|\bpthread_(?:mutex|cond|rwlock|spin|barrier)_\w+|\bpthread_(?:create|join|detach|timedjoin_np|clockjoin_np)\b"
+    r"|\b(?:clock_gettime|clock_nanosleep|nanosleep|usleep|sched_yield|gettimeofday|sigwait\w*|sigtimedwait"
+    r"|pthread_getcpuclockid|SYS_futex\w*|SYS_membarrier)\b"
+)
 
 # Examples and benchmarks see the kernel as any user does: by the door and by headers of storeys.
 PUBLIC_ONLY = ("mauve_examples", "benchmarks")
@@ -146,9 +159,22 @@ def upward_includes(kernel: Path) -> list[str]:
     return lines + [f"{KERNEL}/{name} does not include {included} any more" for name, included in exceptions]
 
 
+def past_the_seam(root: Path) -> list[str]:
+    """Return one line per place where the kernel or the rules wait, wake or read a clock by themselves."""
+    lines = []
+    for path in [*cpp_files(root / KERNEL), *cpp_files(root / "mauve_rt/rules")]:
+        if path.relative_to(root).parent.as_posix() in SEAM:
+            continue
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            found = OF_THE_SEAM.search(line.partition("//")[0])
+            if found:
+                lines.append(f"{path.relative_to(root)}:{number}: {found.group()}: use mauve_rt/base/seam/")
+    return lines
+
+
 def violations(root: Path) -> list[str]:
     """Return one line per include or import that breaks a rule."""
-    lines = upward_includes(root / KERNEL)
+    lines = upward_includes(root / KERNEL) + past_the_seam(root)
     for item in RULES:
         for path in cpp_files(root / item.folder):
             lines += [

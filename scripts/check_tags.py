@@ -33,7 +33,7 @@ NO_CODE = re.compile(
     re.MULTILINE | re.DOTALL,
 )
 MACRO_CALL = re.compile(r"^MAUVE_\w+\([^;{]*?\)$", re.MULTILINE)  # MAUVE_TYPE(...), at global scope
-TYPE = re.compile(r"^(?:class|struct|union)\b\s*(\w*)")
+TYPE = re.compile(r"^(?:class|struct|union)\b\s*(?:MAUVE_\w+\s+)?(\w*)")
 NO_FUNCTION = re.compile(
     r"^(?:using|typedef|friend|static_assert|extern\s+template|template\s+class|concept|enum|class|struct)\b"
 )

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/deploy/deployer.hpp"
 
 #include "transaction.hpp"

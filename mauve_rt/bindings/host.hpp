@@ -2,7 +2,7 @@
 // What runs an architecture, as Python holds it.
 #pragma once
 
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/deploy/trace_collector.hpp"
 

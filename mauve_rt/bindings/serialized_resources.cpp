@@ -91,7 +91,7 @@ class SerializedResource : public Resource {
     if (message.size() > max_bytes_) return TryWrite::done;
     {
       if (!mutex_.try_lock()) return TryWrite::busy;
-      const std::lock_guard lock(mutex_, std::adopt_lock);
+      const LockGuard lock(mutex_, std::adopt_lock);
       if (!floor_.admits(time_ns) || !put_in(message, time_ns)) return TryWrite::done;
       log_.put(message, time_ns);
     }

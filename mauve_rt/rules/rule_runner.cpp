@@ -2,13 +2,12 @@
 #include "mauve_rt/rules/rule_runner.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <mutex>
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 
 namespace mauve::rules {
@@ -342,7 +341,7 @@ void RuleRunner::keep(Rule& rule) {
     if (kept.problem.empty()) kept.problem = action.problem();
     kept.memory_bytes += action.memory_bytes();
   }
-  const std::lock_guard lock(told_mutex_);
+  const LockGuard lock(told_mutex_);
   if (rule.kept == kept) return;
   rule.kept = std::move(kept);
   told_changed_.notify_all();
@@ -358,7 +357,7 @@ void RuleRunner::report(std::size_t index) {
 
 void RuleRunner::deliver(Rule& rule, Act act, ActionReport report) {
   {
-    const std::lock_guard lock(told_mutex_);
+    const LockGuard lock(told_mutex_);
     rule.reports[index_of(act)].push_back(std::move(report));
   }
   work_.bump();
@@ -379,7 +378,7 @@ void RuleRunner::run_follower() noexcept {
 bool RuleRunner::look_around() {
   const std::string unobservable = follow();
   {
-    const std::lock_guard lock(told_mutex_);
+    const LockGuard lock(told_mutex_);
     if (unobservable_ != unobservable) {
       unobservable_ = unobservable;
       told_changed_.notify_all();
@@ -448,7 +447,7 @@ std::uint64_t RuleRunner::collect() {
 
 void RuleRunner::tell() {
   const std::uint64_t left_out = collect();
-  const std::lock_guard lock(told_mutex_);
+  const LockGuard lock(told_mutex_);
   left_out_ += left_out;
   std::vector<Told> all;
   for (const auto& rule : rules_) {
@@ -480,28 +479,30 @@ void RuleRunner::tell() {
 // ---- anyone
 
 std::vector<Told> RuleRunner::wait_told(time_ns_t timeout_ns) {
-  std::unique_lock lock(told_mutex_);
-  told_changed_.wait_for(lock, std::chrono::nanoseconds(timeout_ns),
-                         [&] { return woken_ || !told_.empty(); });
+  const LockGuard lock(told_mutex_);
+  const time_ns_t until_ns = later_by(monotonic_now_ns(), timeout_ns);
+  while (!woken_ && told_.empty() && told_changed_.wait_until(told_mutex_, until_ns)) {
+  }
   std::vector<Told> taken(std::make_move_iterator(told_.begin()), std::make_move_iterator(told_.end()));
   told_.clear();
   return taken;
 }
 
 void RuleRunner::wake() {
-  const std::lock_guard lock(told_mutex_);
+  const LockGuard lock(told_mutex_);
   woken_ = true;
   told_changed_.notify_all();
 }
 
 std::uint64_t RuleRunner::lost() const {
-  const std::lock_guard lock(told_mutex_);
+  const LockGuard lock(told_mutex_);
   return engine_->lost() + left_out_;
 }
 
 std::vector<RuleFacts> RuleRunner::facts() const {
   std::vector<RuleFacts> all;
-  const std::scoped_lock lock(told_mutex_, status_mutex_);
+  const LockGuard told(told_mutex_);
+  const LockGuard status(status_mutex_);
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     Rule& rule = *rules_[i];
     all.push_back({.name = engine_->rule(i).name,

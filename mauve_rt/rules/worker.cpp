@@ -5,7 +5,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve::rules {
 

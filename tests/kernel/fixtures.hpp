@@ -108,8 +108,8 @@ inline std::vector<TraceRecord> records_of(const TraceDrain& drain, TraceKind ki
 
 /// The component, which is stopped, was released at each instant but those that a busy machine made it skip; the last ones may
 /// have no release after them.
-inline void expect_released_at_each_instant(const std::vector<time_ns_t>& instants, const Component& component,
-                                            time_ns_t period_ns) {
+inline void expect_released_at_each_instant(const std::vector<time_ns_t>& instants,
+                                            const Component& component, time_ns_t period_ns) {
   ASSERT_GE(instants.size(), 2U);
   const time_ns_t missing =
       (instants.back() - instants.front()) / period_ns - (static_cast<time_ns_t>(instants.size()) - 1);

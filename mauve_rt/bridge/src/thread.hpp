@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve::bridge {
 

@@ -7,7 +7,7 @@
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/keep_for_ever.hpp"
@@ -89,8 +89,8 @@ std::unique_ptr<TransactionCommit> Architecture::make(Transaction transaction,
     std::uint64_t first;
   };
   const Disposed last{*this, disposed()};
-  const std::lock_guard change(change_lock_);
-  std::shared_lock<std::shared_mutex> use;
+  const LockGuard change(change_lock_);
+  std::shared_lock<SharedMutex> use;
   Runner* const host = use_host(use);
   auto work = std::make_unique<TransactionCommit>(*this, host, options);
   work->make(std::move(transaction));
@@ -208,8 +208,8 @@ void Architecture::settle_probations_if_idle() noexcept {
   if (!change_lock_.try_lock()) return;
   const std::uint64_t first = disposed();
   {
-    const std::lock_guard change(change_lock_, std::adopt_lock);
-    std::shared_lock<std::shared_mutex> use;
+    const LockGuard change(change_lock_, std::adopt_lock);
+    std::shared_lock<SharedMutex> use;
     use_host(use);
     settle_changes();
     settle_probations();
@@ -219,13 +219,13 @@ void Architecture::settle_probations_if_idle() noexcept {
 
 void Architecture::keep_open(std::shared_ptr<OpenChange> change) {
   MAUVE_EXPECTS(change_lock_.is_held_here());
-  const std::lock_guard lock(open_mutex_);
+  const LockGuard lock(open_mutex_);
   open_.push_back(std::move(change));
 }
 
 void Architecture::forget_open(const OpenChange& change) noexcept {
   std::shared_ptr<OpenChange> forgotten;  // ends without the mutex: its parts are user code
-  const std::lock_guard lock(open_mutex_);
+  const LockGuard lock(open_mutex_);
   const auto place =
       std::find_if(open_.begin(), open_.end(), [&](const auto& each) { return each.get() == &change; });
   if (place == open_.end()) return;
@@ -235,13 +235,13 @@ void Architecture::forget_open(const OpenChange& change) noexcept {
 
 std::vector<OpenChangeFacts> Architecture::open_changes() const {
   std::vector<OpenChangeFacts> all;
-  const std::lock_guard lock(open_mutex_);
+  const LockGuard lock(open_mutex_);
   for (const auto& change : open_) change->tell(all);
   return all;
 }
 
 std::shared_ptr<Component> Architecture::find_awaited(const std::string& name) const {
-  const std::lock_guard lock(open_mutex_);
+  const LockGuard lock(open_mutex_);
   for (const auto& change : open_) {
     if (auto component = change->find_awaited(name)) return component;
   }
@@ -249,7 +249,7 @@ std::shared_ptr<Component> Architecture::find_awaited(const std::string& name) c
 }
 
 bool Architecture::call_off_preparation(const std::string& target) const {
-  const std::lock_guard lock(open_mutex_);
+  const LockGuard lock(open_mutex_);
   return std::any_of(open_.begin(), open_.end(), [&](const auto& change) {
     return change->is_about(target) && change->call_off_preparation();
   });
@@ -294,15 +294,15 @@ void Architecture::throw_earlier(EarlierChange earlier, time_ns_t waited_ns) con
 
 void Architecture::settle_if_idle() noexcept {
   if (!has_open_.load(std::memory_order_relaxed) || !change_lock_.try_lock()) return;  // relaxed: a hint
-  const std::lock_guard change(change_lock_, std::adopt_lock);
-  std::shared_lock<std::shared_mutex> use;
+  const LockGuard change(change_lock_, std::adopt_lock);
+  std::shared_lock<SharedMutex> use;
   use_host(use);
   settle_changes();
 }
 
-Runner* Architecture::use_host(std::shared_lock<std::shared_mutex>& use) const {
+Runner* Architecture::use_host(std::shared_lock<SharedMutex>& use) const {
   MAUVE_EXPECTS(change_lock_.is_held_here());
-  const std::lock_guard lock(host_mutex_);
+  const LockGuard lock(host_mutex_);
   // Only its end waits for that. Tried: changes share it, and a host that ends was released before. A hook may shut down
   // the host, which takes these locks the other way round.
   if (host_ != nullptr) use = host_->use();
@@ -315,13 +315,13 @@ void Architecture::drop_stale_prepared() noexcept {
 }
 
 Runner* Architecture::host() const {
-  const std::lock_guard lock(host_mutex_);
+  const LockGuard lock(host_mutex_);
   return host_;
 }
 
 void Architecture::set_host(Runner& host) {
   {
-    const std::lock_guard lock(host_mutex_);
+    const LockGuard lock(host_mutex_);
     if (host_ != nullptr) {
       throw Error(ErrorCode::already_running, "the architecture is deployed, or simulated, already",
                   {.expected = "an architecture without a host", .remedy = "shut its host down first"});
@@ -342,7 +342,7 @@ void Architecture::set_host(Runner& host) {
 }
 
 void Architecture::release_host(const Runner& host) noexcept {
-  const std::lock_guard lock(host_mutex_);
+  const LockGuard lock(host_mutex_);
   if (host_ == &host) host_ = nullptr;
 }
 
@@ -407,7 +407,7 @@ void Architecture::subscribe(const std::string& name) {
 }
 
 void Architecture::note_restructured() noexcept {
-  const std::lock_guard structural(commit_gate_.structural);
+  const LockGuard structural(commit_gate_.structural);
   const CommitGate::Look table(commit_gate_);
   commit_gate_.restructured();
 }

@@ -26,13 +26,13 @@ struct Member {
 std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) {
   std::shared_ptr<Component> made;
   {
-    const std::lock_guard lock(list_mutex_);
+    const LockGuard lock(list_mutex_);
     const std::optional<std::uint16_t> free = find_free_number(name);
     const auto member = std::make_shared<Member>(name, free ? *free : give_number(name));
     made = {member, &member->component};
     numbered_[made->task().number()] = made;
   }
-  const std::lock_guard lock(trace_mutex_);
+  const LockGuard lock(trace_mutex_);
   Task& task = made->task();
   if (task.number() < finals_.size()) task.set_first_record(finals_[task.number()].written);
   made->set_self(made);
@@ -61,32 +61,32 @@ std::uint16_t Architecture::give_number(const std::string& name) {
 
 std::uint16_t Architecture::trace_number(const std::string& name) {
   const auto change = change_lock_.join();  // one that fails gives numbers back
-  const std::lock_guard lock(list_mutex_);
+  const LockGuard lock(list_mutex_);
   const auto found = std::find(names_.begin(), names_.end(), name);
   return found == names_.end() ? give_number(name) : static_cast<std::uint16_t>(found - names_.begin());
 }
 
 std::size_t Architecture::numbers() const {
-  const std::lock_guard lock(list_mutex_);
+  const LockGuard lock(list_mutex_);
   return names_.size();
 }
 
 void Architecture::give_back_numbers(std::size_t numbers) {
-  const std::lock_guard lock(list_mutex_);
+  const LockGuard lock(list_mutex_);
   if (numbers >= names_.size()) return;
   names_.resize(numbers);
   numbered_.erase(numbered_.lower_bound(static_cast<std::uint16_t>(numbers)), numbered_.end());
 }
 
 void Architecture::keep_until_ended(std::shared_ptr<Component> component, bool was_listed) {
-  const std::lock_guard lock(list_mutex_);
+  const LockGuard lock(list_mutex_);
   leaving_.push_back({.component = std::move(component), .was_listed = was_listed});
 }
 
 void Architecture::retire(std::vector<std::shared_ptr<Resource>> resources) {
   if (resources.empty()) return;
   {
-    const std::lock_guard lock(list_mutex_);
+    const LockGuard lock(list_mutex_);
     retiring_.insert(retiring_.end(), resources.begin(), resources.end());
   }
   resources.clear();
@@ -102,7 +102,7 @@ void Architecture::reap() {
     all.erase(first, all.end());
   };
   {
-    const std::lock_guard lock(list_mutex_);
+    const LockGuard lock(list_mutex_);
     split(leaving_, ended,
           [](const Leaving& leaving) { return leaving.component->task().end_thread(monotonic_now_ns()); });
   }
@@ -114,7 +114,7 @@ void Architecture::reap() {
     if (leaving.was_listed) retire_trace(leaving.component->task());
   }
   {
-    const std::lock_guard lock(list_mutex_);
+    const LockGuard lock(list_mutex_);
     split(retiring_, unused, [](const auto& resource) { return !resource->is_in_use(); });
   }
   for (const auto& resource : unused)
@@ -122,19 +122,19 @@ void Architecture::reap() {
 }
 
 std::size_t Architecture::threads_left_behind() const {
-  const std::lock_guard lock(list_mutex_);
+  const LockGuard lock(list_mutex_);
   return static_cast<std::size_t>(std::count_if(leaving_.begin(), leaving_.end(), [](const Leaving& leaving) {
     return !leaving.component->task().has_ended();
   }));
 }
 
 std::vector<std::string> Architecture::trace_components() const {
-  const std::lock_guard lock(list_mutex_);
+  const LockGuard lock(list_mutex_);
   return names_;
 }
 
 void Architecture::retire_trace(Task& task) {
-  const std::lock_guard lock(trace_mutex_);
+  const LockGuard lock(trace_mutex_);
   const std::unique_ptr<TraceRing> ring = task.release_ring();
   if (ring == nullptr) return;
   std::vector<TraceRecord> records;
@@ -152,14 +152,14 @@ void Architecture::keep_records(const std::vector<TraceRecord>& records) {
 }
 
 void Architecture::record(TraceRecord record) {
-  const std::lock_guard lock(trace_mutex_);
+  const LockGuard lock(trace_mutex_);
   if (finals_.size() <= record.component) finals_.resize(record.component + std::size_t{1});
   record.sequence = finals_[record.component].written++;
   keep_records({record});
 }
 
 TraceDrain Architecture::drain_trace() {
-  const std::lock_guard lock(trace_mutex_);
+  const LockGuard lock(trace_mutex_);
   const auto present = components();
   TraceDrain drain;
   drain.records.assign(retired_.begin(), retired_.end());

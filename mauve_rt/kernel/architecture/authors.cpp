@@ -4,7 +4,7 @@
 namespace mauve {
 
 void Authors::note(const std::string& target, const std::string& element, const std::string& author) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   if (author.empty()) {
     by_.erase({target, element});
   } else {
@@ -13,18 +13,18 @@ void Authors::note(const std::string& target, const std::string& element, const 
 }
 
 void Authors::forget(const std::string& target) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   std::erase_if(by_, [&target](const auto& entry) { return entry.first.first == target; });
 }
 
 std::string Authors::of(const std::string& target, const std::string& element) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto found = by_.find({target, element});
   return found != by_.end() ? found->second : "";
 }
 
 std::vector<Authored> Authors::all() const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   std::vector<Authored> found;
   found.reserve(by_.size());
   for (const auto& [element, author] : by_)

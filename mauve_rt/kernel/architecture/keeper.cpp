@@ -2,15 +2,13 @@
 #include "mauve_rt/architecture/keeper.hpp"
 
 #include <algorithm>
-#include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <map>
-#include <mutex>
-#include <thread>
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
 
 #include "base/keep_for_ever.hpp"
 
@@ -41,45 +39,45 @@ struct Keeper::State {
     bool has_next() const noexcept { return holds == 0 && !works.empty(); }
     std::uint64_t oldest() const noexcept { return at != 0 || !has_next() ? at : works.front().number; }
   };
-  std::mutex mutex;
-  std::condition_variable changed;
-  std::map<const void*, Lane> lanes;
-  std::uint64_t taken{0};
+  Mutex mutex;
+  ConditionVariable changed;
+  std::map<const void*, Lane> lanes MAUVE_GUARDED_BY(mutex);
+  std::uint64_t taken MAUVE_GUARDED_BY(mutex){0};
 };
 
 Keeper::Keeper() : state_(std::make_shared<State>()) {}
 
 Keeper::~Keeper() {
   wait(0, monotonic_now_ns() + kEnd);
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   const auto is_held = [](const auto& each) { return each.second.holds != 0; };
   // Who holds a lane uses what waits there.
   if (std::any_of(state_->lanes.begin(), state_->lanes.end(), is_held)) keep_for_ever(state_);
 }
 
 void Keeper::take(std::string what, std::function<void()> work, const void* lane, Place place) {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   State::Lane& its = state_->lanes[lane];
   its.works.insert(place == Place::next ? its.works.begin() : its.works.end(),
                    {.what = std::move(what), .call = std::move(work), .number = ++state_->taken});
   run_if_idle(state_, lane);
 }
 
-void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) {
+void Keeper::run_if_idle(const std::shared_ptr<State>& state, const void* lane) MAUVE_REQUIRES(state->mutex) {
   State::Lane& its = state->lanes.at(lane);
   if (its.thread != std::thread::id{} || !its.has_next()) return;
-  std::thread thread(&Keeper::run, state, lane);
+  OrdinaryThread thread(&Keeper::run, state, lane);
   its.thread = thread.get_id();
   thread.detach();  // it ends with the work of its lane, and owns what it uses
 }
 
 void Keeper::hold(const void* lane) {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   ++state_->lanes[lane].holds;
 }
 
 void Keeper::release(const void* lane) {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   State::Lane& its = state_->lanes.at(lane);
   MAUVE_EXPECTS(its.holds > 0);
   if (--its.holds > 0 || its.thread != std::thread::id{}) return;
@@ -91,23 +89,23 @@ void Keeper::release(const void* lane) {
 }
 
 bool Keeper::is_at(const void* lane) const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   return state_->lanes.contains(lane);
 }
 
 bool Keeper::is_held(const void* lane) const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   const auto found = state_->lanes.find(lane);
   return found != state_->lanes.end() && found->second.holds != 0;
 }
 
 std::uint64_t Keeper::taken() const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   return state_->taken;
 }
 
 void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
-  std::unique_lock lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   const std::uint64_t taken = state_->taken;
   const auto is_awaited = [&](const auto& each) {
     const State::Lane& lane = each.second;
@@ -119,11 +117,11 @@ void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
   const auto& lanes = state_->lanes;
   if (std::any_of(lanes.begin(), lanes.end(), is_own)) return;
   while (monotonic_now_ns() < until_ns && std::any_of(lanes.begin(), lanes.end(), is_awaited))
-    state_->changed.wait_for(lock, std::chrono::milliseconds(20));
+    state_->changed.wait_until(state_->mutex, monotonic_now_ns() + ms_to_ns(20));
 }
 
 Keeper::Busy Keeper::busy() const {
-  const std::lock_guard lock(state_->mutex);
+  const LockGuard lock(state_->mutex);
   Busy longest;
   for (const auto& [key, lane] : state_->lanes) {
     if (lane.at == 0 || (longest.since_ns != 0 && longest.since_ns <= lane.busy.since_ns)) continue;
@@ -133,7 +131,7 @@ Keeper::Busy Keeper::busy() const {
 }
 
 void Keeper::run(const std::shared_ptr<State>& state, const void* lane) {
-  std::unique_lock lock(state->mutex);
+  UniqueLock lock(state->mutex);
   State::Lane& its = state->lanes.at(lane);
   while (its.has_next()) {
     MAUVE_AUDIT(its.at == 0 && its.thread == std::this_thread::get_id());

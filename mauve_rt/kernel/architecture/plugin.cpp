@@ -98,14 +98,14 @@ std::vector<std::string> names_of(const std::vector<ResourceParameter>& paramete
 template <typename Made>
 Made PluginRegistry::entry_of(const std::map<std::string, Made>& entries, const std::string& name,
                               ErrorCode code, const std::string& what) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   return require_entry(entries, name, code, what);
 }
 
 template <typename Made>
 void PluginRegistry::add(std::map<std::string, Made> PluginRegistry::* entries, const std::string& name,
                          const std::string& shown, Made entry) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   auto& all = this->*entries;
   entry.generation = generation_;
   const auto before = all.find(name);
@@ -140,7 +140,7 @@ std::vector<ResourceKind> PluginRegistry::given_resource_kinds() {
 }
 
 void PluginRegistry::load_library(const std::string& path) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   if (libraries_.contains(path)) return;
   void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {
@@ -172,14 +172,14 @@ void PluginRegistry::load_library(const std::string& path) {
 
 void PluginRegistry::add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory,
                                std::vector<std::string> classes) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   add(&PluginRegistry::shells_, name, "shell " + name,
       Entry<Shell>{
           .shell = "", .make = std::move(factory), .classes = std::move(classes), .library = loading_});
 }
 void PluginRegistry::add_core(const std::string& name, const std::string& shell_name, CoreFactory factory,
                               std::vector<std::string> classes) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   add(&PluginRegistry::cores_, name, "core " + name,
       Entry<CoreBase>{.shell = shell_name,
                       .make = std::move(factory),
@@ -190,7 +190,7 @@ void PluginRegistry::add_core(const std::string& name, const std::string& shell_
 void PluginRegistry::add_fsm(const std::string& name, const std::string& shell_name,
                              std::function<std::unique_ptr<FsmBase>()> factory,
                              std::vector<std::string> classes) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   add(&PluginRegistry::fsms_, name, "fsm " + name,
       Entry<FsmBase>{.shell = shell_name,
                      .make = std::move(factory),
@@ -240,20 +240,20 @@ void PluginRegistry::add_resource(ResourceKind kind, ResourceFactory factory) {
 }
 
 void PluginRegistry::begin_generation(int number, std::shared_ptr<PluginGeneration> replaced) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   generation_ = number;
   replaced_ = std::move(replaced);
 }
 
 void PluginRegistry::end_generation() noexcept {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   generation_ = 1;
   replaced_ = nullptr;
   version_.fetch_add(1, std::memory_order_release);
 }
 
 void PluginRegistry::drop(const std::string& kind, const std::string& name) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto keep = [&](auto& entries) {
     const auto found = entries.find(name);
     if (found == entries.end() || replaced_ == nullptr) return;
@@ -268,7 +268,7 @@ void PluginRegistry::drop(const std::string& kind, const std::string& name) {
 }
 
 void PluginRegistry::exchange(PluginGeneration& other) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto swap = [&other]<typename Made>(std::map<std::string, Made>& entries) {
     for (auto& [name, kept] : other.of(entries)) {
       auto back = std::move(kept);
@@ -289,7 +289,7 @@ void PluginRegistry::exchange(PluginGeneration& other) {
 }
 
 int PluginRegistry::generation_of(const std::string& kind, const std::string& name) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto in = [&name](const auto& entries) {
     const auto found = entries.find(name);
     return found == entries.end() ? 0 : found->second.generation;
@@ -301,7 +301,7 @@ int PluginRegistry::generation_of(const std::string& kind, const std::string& na
 }
 
 std::vector<std::string> PluginRegistry::classes_of(const std::string& kind, const std::string& name) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto in = [&name](const auto& entries) {
     const auto found = entries.find(name);
     return found == entries.end() ? std::vector<std::string>{} : found->second.classes;
@@ -312,7 +312,7 @@ std::vector<std::string> PluginRegistry::classes_of(const std::string& kind, con
 }
 
 std::vector<MessageShape> PluginRegistry::type_shapes() const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   std::vector<MessageShape> shapes;
   shapes.reserve(ports_.size());
   for (const auto& [type, factories] : ports_) shapes.push_back(factories.shape());
@@ -355,7 +355,7 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
                                                         const ResourceParameters& given) const {
   ResourceFactory make;
   {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     const ResourceKind known = resource_kind(kind);
     const auto& factories = resources_.at(kind).factories;
     const auto factory = factories.find(type);
@@ -367,7 +367,7 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
 }
 
 ResourceKind PluginRegistry::resource_kind(const std::string& name) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   if (const auto found = resources_.find(name); found != resources_.end()) return found->second.kind;
   throw Error(ErrorCode::unknown_resource, "there is no such kind of resource",
               {.element = "kind " + name,
@@ -439,7 +439,7 @@ std::unique_ptr<PortBase> PluginRegistry::make_port(PortKind kind, const std::st
                  .found = std::string(to_string(kind)) + " of " + type,
                  .remedy = "declare call ports in a C++ shell"});
   }
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto found = ports_.find(type);
   if (found == ports_.end()) throw_unknown_type(type);
   return kind == PortKind::read ? found->second.read(name) : found->second.write(name, output);
@@ -461,13 +461,13 @@ std::string PluginRegistry::fsm_shell(const std::string& name) const {
 }
 
 std::size_t PluginRegistry::value_bytes(const std::string& type) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const auto found = ports_.find(type);
   return found != ports_.end() ? found->second.value_bytes : 0;
 }
 
 std::vector<std::string> PluginRegistry::names(const std::string& kind) const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   std::set<std::string> found;
   const auto add_keys = [&found](const auto& entries) {
     for (const auto& [name, entry] : entries) found.insert(name);

@@ -1,26 +1,12 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/base/biased_mutex.hpp"
 
-#include <linux/futex.h>
-#include <sys/syscall.h>
-#include <unistd.h>
-
-#include <ctime>
-#include <mutex>
-
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 
 namespace mauve {
-
-namespace {
-
-/// [rt] Bounded as PiMutex: who holds the word inherits the priority.
-bool futex_pi(std::atomic<std::uint32_t>& word, int operation) MAUVE_RT {
-  return MAUVE_RT_TRUSTED(
-      syscall(SYS_futex, reinterpret_cast<std::uint32_t*>(&word), operation, 0, nullptr, nullptr, 0) == 0);
-}
-
-}  // namespace
 
 /// The user has left, and somebody has taken the bias away: unlocks the futex, if that one has locked it on our behalf.
 void BiasedMutex::Seat::hand_over() noexcept {
@@ -28,12 +14,12 @@ void BiasedMutex::Seat::hand_over() noexcept {
   const std::uint32_t id = id_.load(std::memory_order_relaxed);
   std::uint32_t mine = id;
   if (handover_.compare_exchange_strong(mine, 0, std::memory_order_seq_cst)) return;
-  if ((mine & FUTEX_TID_MASK) == id) futex_pi(handover_, FUTEX_UNLOCK_PI_PRIVATE);
+  if ((mine & kFutexHolder) == id) futex_unlock_pi(handover_);
 }
 
 /// Until the user has left, which inherits the caller's priority. One thread at a time.
 void BiasedMutex::Seat::await_leave() noexcept {
-  constexpr timespec kBetweenLooks{.tv_sec = 0, .tv_nsec = 20'000};
+  constexpr time_ns_t kBetweenLooks = us_to_ns(20);
   for (;;) {
     std::uint32_t user = inside_.load(std::memory_order_acquire);
     if (user == 0) return;
@@ -43,11 +29,11 @@ void BiasedMutex::Seat::await_leave() noexcept {
       handover_.compare_exchange_strong(user, 0, std::memory_order_seq_cst);
       continue;
     }
-    if (futex_pi(handover_, FUTEX_LOCK_PI_PRIVATE)) {
-      futex_pi(handover_, FUTEX_UNLOCK_PI_PRIVATE);
+    if (futex_lock_pi(handover_)) {
+      futex_unlock_pi(handover_);
     } else {  // a thread of another process id namespace, or one that has ended
       handover_.store(0, std::memory_order_seq_cst);
-      MAUVE_RT_TRUSTED(clock_nanosleep(CLOCK_MONOTONIC, 0, &kBetweenLooks, nullptr));
+      sleep_for(kBetweenLooks);
     }
   }
 }
@@ -98,7 +84,7 @@ void BiasedMutex::grant() noexcept {
 }
 
 void BiasedMutex::add(Seat& seat) noexcept {
-  const std::lock_guard lock(*this);
+  const LockGuard lock(*this);
   seat.next_ = first_;
   first_ = &seat;
   grant();
@@ -117,7 +103,7 @@ void BiasedMutex::remove(Seat& seat) noexcept {
 }
 
 void BiasedMutex::share() noexcept {
-  const std::lock_guard lock(*this);
+  const LockGuard lock(*this);
   is_shared_ = true;
   grant();
 }

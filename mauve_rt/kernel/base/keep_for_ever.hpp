@@ -3,17 +3,18 @@
 #pragma once
 
 #include <deque>
-#include <mutex>
 #include <utility>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
 /// Until the process ends, and beyond the end of static objects. [non-rt]
 template <typename Objects>
 void keep_for_ever(Objects objects) {
-  static std::mutex mutex;
+  static Mutex mutex;
   static auto* const kept = new std::deque<Objects>;
-  const std::lock_guard lock(mutex);
+  const LockGuard lock(mutex);
   kept->push_back(std::move(objects));
 }
 

@@ -3,11 +3,8 @@
 
 #include <unistd.h>
 
-#include <cerrno>
-#include <ctime>
 #include <utility>
 
-#include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/trace.hpp"
 
 namespace mauve {
@@ -28,19 +25,8 @@ ThisThread& this_thread() MAUVE_RT { return MAUVE_RT_TRUSTED(this_threads_own); 
 
 }  // namespace
 
-PiMutex::PiMutex() {
-  pthread_mutexattr_t attributes;
-  pthread_mutexattr_init(&attributes);
-  pthread_mutexattr_setprotocol(&attributes, PTHREAD_PRIO_INHERIT);
-  pthread_mutexattr_settype(&attributes, PTHREAD_MUTEX_ERRORCHECK);
-  const int result = pthread_mutex_init(&mutex_, &attributes);
-  pthread_mutexattr_destroy(&attributes);
-  if (result != 0) throw Error(ErrorCode::internal, "the system has no priority-inheritance mutexes");
-}
-
 PiMutex::~PiMutex() {
   if (held_by_this_thread() > 0 && holder_.load(std::memory_order_relaxed) == this_thread().id) forget_held();
-  pthread_mutex_destroy(&mutex_);
 }
 
 /// Taken away while its holder, this thread, holds it.
@@ -63,7 +49,7 @@ inline void PiMutex::note_holder() noexcept {
 
 // Bounded as long as what its holders do is, which keep their sections to a copy, and inherit who waits' priority.
 void PiMutex::lock() noexcept {
-  if (MAUVE_RT_TRUSTED(pthread_mutex_trylock(&mutex_)) == 0 || lock_contended()) return note_holder();
+  if (mutex_.try_lock() || lock_contended()) return note_holder();
   ++depth_;  // its holder's already
   this_thread().misused = true;
 }
@@ -72,7 +58,7 @@ void PiMutex::lock() noexcept {
 bool PiMutex::lock_contended() noexcept {
   const std::int32_t holder = holder_.load(std::memory_order_relaxed);
   const time_ns_t began = monotonic_now_ns();
-  if (MAUVE_RT_TRUSTED(pthread_mutex_lock(&mutex_)) == EDEADLK) return false;
+  if (!mutex_.lock()) return false;
   if (TraceRing* ring = TraceRing::of_this_thread()) {
     ring->push(TraceKind::contended, trace_id_, holder, monotonic_now_ns() - began);
   }
@@ -80,7 +66,7 @@ bool PiMutex::lock_contended() noexcept {
 }
 
 bool PiMutex::try_lock() noexcept {
-  if (MAUVE_RT_TRUSTED(pthread_mutex_trylock(&mutex_)) != 0) return false;
+  if (!mutex_.try_lock()) return false;
   note_holder();
   return true;
 }
@@ -92,18 +78,8 @@ bool PiMutex::try_lock_until(time_ns_t until_ns) noexcept {
     if (is_others) note_holder();
     return is_others;
   }
-#if !defined(__SANITIZE_THREAD__)  // it does not know the timed lock of the monotonic clock
-  constexpr time_ns_t kSecond = 1'000'000'000;
-  const timespec until{.tv_sec = until_ns / kSecond, .tv_nsec = until_ns % kSecond};
-  const int result = MAUVE_RT_TRUSTED(pthread_mutex_clocklock(&mutex_, CLOCK_MONOTONIC, &until));
-  if (result == 0) note_holder();
-  if (result != EINVAL) return result == 0;  // else the system has no timed lock with inheritance
-#endif
-  constexpr timespec kBetweenTries{.tv_sec = 0, .tv_nsec = 50'000};
-  while (!try_lock()) {
-    if (monotonic_now_ns() >= until_ns) return false;
-    MAUVE_RT_TRUSTED(clock_nanosleep(CLOCK_MONOTONIC, 0, &kBetweenTries, nullptr));
-  }
+  if (!mutex_.try_lock_until(until_ns)) return false;
+  note_holder();
   return true;
 }
 
@@ -117,7 +93,7 @@ void PiMutex::unlock() noexcept {
   } else {
     *place = below_;
     this_thread().held.store(held_by_this_thread() - 1, std::memory_order_relaxed);
-    MAUVE_RT_TRUSTED(pthread_mutex_unlock(&mutex_));
+    mutex_.unlock();
   }
 }
 

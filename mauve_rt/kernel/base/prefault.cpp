@@ -13,11 +13,12 @@
 #include <charconv>
 #include <cstdint>
 #include <exception>
-#include <mutex>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
@@ -207,18 +208,18 @@ struct Looked {
   std::uintptr_t private_pages{0};  // at the last look
 };
 
-std::mutex prefault_mutex;
-Looked looked;
+Mutex prefault_mutex;
+Looked looked MAUVE_GUARDED_BY(prefault_mutex);
 
 /// With as many pages as then, and all mappings of then still there, no mapping is new. The allocator may have given
 /// back the pages of a mapping, and taken it again: those are put into memory anew.
-bool is_as_looked_at(std::uintptr_t pages) noexcept {
+bool is_as_looked_at(std::uintptr_t pages) noexcept MAUVE_REQUIRES(prefault_mutex) {
   return pages != 0 && pages == looked.private_pages &&
          std::all_of(looked.populated.begin(), looked.populated.end(), populate_missing);
 }
 
 /// Reads the list of all mappings: with 850 of them 1 ms.
-void look_anew(std::uintptr_t pages) {
+void look_anew(std::uintptr_t pages) MAUVE_REQUIRES(prefault_mutex) {
   const std::vector<Mapping> mappings = read_mappings();
   std::vector<Range> now;
   now.reserve(mappings.size());
@@ -252,7 +253,7 @@ void prefault(void* from, std::size_t bytes) noexcept {
 
 void note_allocated_before() noexcept {
   try {
-    const std::lock_guard lock(prefault_mutex);
+    const LockGuard lock(prefault_mutex);
     if (looked.is_noted) return;
     looked.is_noted = true;
     for (const Mapping& mapping : read_mappings()) looked.before.push_back(mapping.range);
@@ -262,7 +263,7 @@ void note_allocated_before() noexcept {
 
 void prefault_allocated() noexcept {
   try {
-    const std::lock_guard lock(prefault_mutex);
+    const LockGuard lock(prefault_mutex);
     const std::uintptr_t pages = private_pages();  // before the look: what comes during it is for the next
     if (!is_as_looked_at(pages)) look_anew(pages);
   } catch (const std::exception&) {  // no memory, no /proc: pages come when they are touched

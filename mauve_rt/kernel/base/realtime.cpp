@@ -3,7 +3,6 @@
 
 #include <fcntl.h>
 #include <linux/capability.h>
-#include <pthread.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/syscall.h>
@@ -14,6 +13,7 @@
 #include <cstring>
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve {
 
@@ -55,19 +55,9 @@ void RealtimeProcess::acquire(int priority, bool require) {
 
 /// A thread that tries: limits, capabilities and cgroups all have their say, and only the attempt tells.
 void RealtimeProcess::check_fifo(int priority) {
-  pthread_attr_t attributes;
-  pthread_attr_init(&attributes);
-  pthread_attr_setinheritsched(&attributes, PTHREAD_EXPLICIT_SCHED);
-  pthread_attr_setschedpolicy(&attributes, SCHED_FIFO);
-  const sched_param scheduling{.sched_priority = priority};
-  pthread_attr_setschedparam(&attributes, &scheduling);
-  pthread_t thread{};
-  const int result = pthread_create(&thread, &attributes, [](void*) -> void* { return nullptr; }, nullptr);
-  pthread_attr_destroy(&attributes);
-  if (result == 0) {
-    pthread_join(thread, nullptr);
-    return;
-  }
+  Thread thread;
+  const ThreadSettings settings{.name = "trial", .priority = priority, .require_realtime = true};
+  if (thread.start(settings, [](void*) -> void* { return nullptr; }, nullptr) == 0) return thread.join();
   rlimit limit{};
   getrlimit(RLIMIT_RTPRIO, &limit);
   status_.deny("SCHED_FIFO priority " + std::to_string(priority) + " (the rtprio limit is " +

@@ -2,10 +2,10 @@
 #include "mauve_rt/base/running_hook.hpp"
 
 #include <map>
-#include <mutex>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
@@ -13,8 +13,8 @@ namespace {
 
 /// Of all threads that execute one. It outlives static objects, whose parts may be cleaned up at the end of the process.
 struct Running {
-  std::mutex mutex;
-  std::map<std::thread::id, RunningHook::Facts> hooks;
+  Mutex mutex;
+  std::map<std::thread::id, RunningHook::Facts> hooks MAUVE_GUARDED_BY(mutex);
 };
 Running& running() {
   static auto* const all = new Running;
@@ -26,13 +26,13 @@ Running& running() {
 RunningHook::RunningHook(const char* name, const std::string& part)
     : outer_{.hook = std::string(name) + " of " + part, .since_ns = monotonic_now_ns()} {
   Running& all = running();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   std::swap(outer_, all.hooks[std::this_thread::get_id()]);
 }
 
 RunningHook::~RunningHook() {
   Running& all = running();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   if (outer_.hook.empty()) {
     all.hooks.erase(std::this_thread::get_id());
   } else {
@@ -49,7 +49,7 @@ void RunningHook::leave() const {
 
 bool RunningHook::call_off(std::thread::id thread, const std::function<bool()>& decide) {
   Running& all = running();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   const auto found = all.hooks.find(thread);
   if (found == all.hooks.end() || !decide()) return false;
   found->second.is_off = true;
@@ -58,7 +58,7 @@ bool RunningHook::call_off(std::thread::id thread, const std::function<bool()>& 
 
 RunningHook::Facts RunningHook::of(std::thread::id thread) {
   Running& all = running();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   const auto found = all.hooks.find(thread);
   return found != all.hooks.end() ? found->second : Facts{};
 }

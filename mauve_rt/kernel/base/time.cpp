@@ -1,19 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/base/time.hpp"
 
-#include <ctime>
-
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve {
 
 namespace {
-
-time_ns_t read_clock(clockid_t clock) MAUVE_RT {
-  timespec now{};
-  MAUVE_RT_TRUSTED(clock_gettime(clock, &now));  // reads a page of the system's, and makes no call of it
-  return s_to_ns(now.tv_sec) + now.tv_nsec;
-}
 
 /// The way from one instant to the next that is whole periods away from another: 0 to period - 1, whatever the instants.
 time_ns_t to_grid(time_ns_t from, time_ns_t reference, time_ns_t period) noexcept {
@@ -24,9 +16,6 @@ time_ns_t to_grid(time_ns_t from, time_ns_t reference, time_ns_t period) noexcep
 constinit const MonotonicClock the_monotonic_clock{};  // there before anybody asks: no first call makes it
 
 }  // namespace
-
-time_ns_t monotonic_now_ns() noexcept { return read_clock(CLOCK_MONOTONIC); }
-time_ns_t realtime_now_ns() noexcept { return read_clock(CLOCK_REALTIME); }
 
 time_ns_t MonotonicClock::now_ns() const noexcept { return monotonic_now_ns(); }
 

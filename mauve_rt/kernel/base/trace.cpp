@@ -3,18 +3,18 @@
 
 #include <bit>
 #include <map>
-#include <mutex>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
 namespace {
 
 struct NameTable {
-  std::mutex mutex;
-  std::vector<std::string> words{""};  // 0: no name
-  std::map<std::string, std::uint32_t, std::less<>> numbers{{"", 0}};
+  Mutex mutex;
+  std::vector<std::string> words MAUVE_GUARDED_BY(mutex){""};  // 0: no name
+  std::map<std::string, std::uint32_t, std::less<>> numbers MAUVE_GUARDED_BY(mutex){{"", 0}};
 };
 
 NameTable& name_table() {
@@ -28,7 +28,7 @@ constinit thread_local TraceRing* detail::this_threads_ring = nullptr;
 
 std::uint32_t TraceNames::intern(std::string_view word) {
   NameTable& table = name_table();
-  const std::lock_guard lock(table.mutex);
+  const LockGuard lock(table.mutex);
   if (const auto known = table.numbers.find(word); known != table.numbers.end()) return known->second;
   const auto number = static_cast<std::uint32_t>(table.words.size());
   table.words.emplace_back(word);
@@ -38,13 +38,13 @@ std::uint32_t TraceNames::intern(std::string_view word) {
 
 std::string TraceNames::word(std::uint32_t number) {
   NameTable& table = name_table();
-  const std::lock_guard lock(table.mutex);
+  const LockGuard lock(table.mutex);
   return number < table.words.size() ? table.words[number] : "";
 }
 
 std::vector<std::string> TraceNames::all() {
   NameTable& table = name_table();
-  const std::lock_guard lock(table.mutex);
+  const LockGuard lock(table.mutex);
   return table.words;
 }
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What a transaction makes ready before its commit, and throws away when there is none.
 #include <algorithm>
-#include <chrono>
 #include <system_error>
 
 #include "mauve_rt/architecture/runner.hpp"
@@ -16,7 +15,7 @@ namespace mauve {
 namespace {
 
 /// How often who waits for a preparation looks whether a hook of it is overdue.
-constexpr std::chrono::milliseconds kOverdueLook{20};
+constexpr time_ns_t kOverdueLook = ms_to_ns(20);
 
 void connect_all(Shell& shell, const std::map<std::string, Wire>& wires) {
   for (const auto& [name, wire] : wires) {
@@ -72,17 +71,17 @@ bool TransactionCommit::Work::has_hooks() const noexcept {
 /// A thread of its own executes the hooks, which may hang: who asked waits for it until the change is called off.
 void TransactionCommit::Work::prepare_beside_others() {
   if (!has_hooks()) return prepare();
-  std::thread preparer;
+  OrdinaryThread preparer;
   try {
-    preparer = std::thread([self = shared_from_this(), presence = architecture_.presence()] {
+    preparer = OrdinaryThread([self = shared_from_this(), presence = architecture_.presence()] {
       self->run_preparation(*presence);
     });
   } catch (const std::system_error&) {  // there are no threads to be had
     return prepare_interruptibly();
   }
-  std::unique_lock lock(preparation_.mutex);
+  UniqueLock lock(preparation_.mutex);
   while (!preparation_.is_over) {
-    preparation_.changed.wait_for(lock, kOverdueLook);
+    preparation_.changed.wait_until(preparation_.mutex, monotonic_now_ns() + kOverdueLook);
     if (preparation_.is_over) break;
     lock.unlock();
     if (is_overdue()) call_off_preparation();
@@ -109,7 +108,7 @@ void TransactionCommit::Work::run_preparation(ArchitecturePresence& presence) {
     }
   }
   {
-    const std::lock_guard lock(preparation_.mutex);
+    const LockGuard lock(preparation_.mutex);
     preparation_.is_over = true;
     preparation_.failure = std::move(failure);
     preparation_.changed.notify_all();
@@ -122,8 +121,8 @@ void TransactionCommit::Work::run_preparation(ArchitecturePresence& presence) {
 void TransactionCommit::Work::end_left_behind(ArchitecturePresence& presence) {
   const std::shared_lock use(presence.mutex);
   if (presence.architecture == nullptr) return;
-  const std::lock_guard change(architecture_.change_lock());
-  std::shared_lock<std::shared_mutex> host_use;
+  const LockGuard change(architecture_.change_lock());
+  std::shared_lock<SharedMutex> host_use;
   host_ = architecture_.use_host(host_use);
   deployed_ = host_ != nullptr && host_->is_deployed();
   advance(Phase::off);

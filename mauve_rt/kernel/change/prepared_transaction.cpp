@@ -6,12 +6,12 @@
 #include <algorithm>
 #include <atomic>
 #include <exception>
-#include <mutex>
 #include <optional>
 
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 
 #include "change/work.hpp"
 
@@ -86,11 +86,11 @@ class PreparedTransaction::State {
     const CommitGate::Look table(gate);
     if (is_called_off.load(std::memory_order_relaxed) || !host.is_deployed())
       return PreparedOutcome::withdrawn;
-    const bool is_kept_off =
-        std::any_of(basis.touched.begin(), basis.touched.end(), [&gate](const auto& touched) {
-          return touched.component->change_mark().is_held() || gate.has_open_about(touched.component->task());
-        });
-    if (is_kept_off || !is_current()) return PreparedOutcome::stale;
+    for (const auto& touched : basis.touched) {
+      if (touched.component->change_mark().is_held() || gate.has_open_about(touched.component->task()))
+        return PreparedOutcome::stale;
+    }
+    if (!is_current()) return PreparedOutcome::stale;
     MAUVE_EXPECTS(phase.load(std::memory_order_relaxed) == kReady);  // relaxed: within a look
     phase.store(kCommitting, std::memory_order_release);
     return std::nullopt;
@@ -148,7 +148,7 @@ class PreparedTransaction::State {
 
 PreparedTransaction::PreparedTransaction(Architecture& architecture, Runner& host, Transaction transaction,
                                          const TransactionOptions& options) {
-  const std::lock_guard change(architecture.change_lock());
+  const LockGuard change(architecture.change_lock());
   const auto use = host.use();
   const std::size_t before = allocated_bytes();
   state_ = std::make_unique<State>(architecture, host, options);
@@ -256,7 +256,7 @@ TransactionReport PreparedTransaction::complete() {
     state.work->wait_passed(later_by(monotonic_now_ns(), state.phase_ns));
   std::exception_ptr failure;
   {
-    const std::lock_guard change(state.architecture.change_lock());
+    const LockGuard change(state.architecture.change_lock());
     settle();
     note_failure();
     failure = state.failure;  // written again when changes are settled, as long as one component is late

@@ -268,7 +268,7 @@ void TransactionCommit::Work::gather() {
   prepare_publication();
   commit->set_publication(*this);
   if (is_structural_) commit->set_structural();
-  const std::lock_guard lock(facts_mutex_);
+  const LockGuard lock(facts_mutex_);
   commit_.swap(commit);
   touched_.swap(touched);
 }
@@ -447,7 +447,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
   }
-  const std::lock_guard lock(reports_mutex_);
+  const LockGuard lock(reports_mutex_);
   TransactionReport report{.steps = reports_,
                            .revision = architecture_.revision(),
                            .prepare_ns = is_simulated_ ? 0 : prepare_ns_,

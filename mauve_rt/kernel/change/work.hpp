@@ -3,14 +3,13 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <vector>
 
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 #include "mauve_rt/run/commit.hpp"
 
@@ -189,7 +188,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   std::uint32_t structure_{0};  // of a structural one: as it was when this began to look
   std::unique_ptr<Draft> draft_;
 
-  std::mutex reports_mutex_;
+  Mutex reports_mutex_;
   std::vector<StepReport> reports_;  // by step
   time_ns_t prepare_ns_{0};
   std::vector<std::shared_ptr<Resource>> prepared_resources_;
@@ -212,16 +211,16 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   std::atomic<bool> is_preparing_{false};   // beside other changes: each hook that it is at can be called off
   std::atomic<bool> is_called_off_{false};  // the claims are free, and the parts of its components are held
   struct Preparation {
-    std::mutex mutex;
-    std::condition_variable changed;
-    bool is_over{false};
+    Mutex mutex;
+    ConditionVariable changed;
+    bool is_over MAUVE_GUARDED_BY(mutex){false};
     // It was called off, and the requester has returned: the thread that prepares does what is left to be done.
     bool is_left{false};
     std::exception_ptr failure{};
   };
   Preparation preparation_;
-  bool is_prepared_{false};         // for a prepared transaction, which lets go of it if it is not made
-  mutable std::mutex facts_mutex_;  // for a moment: no hook, and no other lock
+  bool is_prepared_{false};    // for a prepared transaction, which lets go of it if it is not made
+  mutable Mutex facts_mutex_;  // for a moment: no hook, and no other lock
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component

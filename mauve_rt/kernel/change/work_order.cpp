@@ -249,7 +249,7 @@ void TransactionCommit::Work::dispose(Change& change) {
 void TransactionCommit::Work::note_handover(const Change& change) {
   const Handover* handover = change.parts != nullptr ? change.parts->handover() : nullptr;
   if (handover == nullptr || handover->is_whole()) return;
-  const std::lock_guard lock(reports_mutex_);
+  const LockGuard lock(reports_mutex_);
   reports_[static_cast<std::size_t>(change.draft->core_step - 1)].left.emplace_back(
       "a field of the old core could not be read at the change: its value is that of the preparation");
 }
@@ -335,7 +335,7 @@ void TransactionCommit::Work::tell(std::vector<OpenChangeFacts>& all) const {
   OpenChangeFacts facts{.author = transaction_.author(),
                         .steps = step_texts_,
                         .begun_ns = begun_ns_.load(std::memory_order_relaxed)};  // relaxed: is_armed_
-  const std::lock_guard lock(facts_mutex_);
+  const LockGuard lock(facts_mutex_);
   if (commit_ == nullptr) {
     RunningHook::Facts running = RunningHook::of(thread_.load(std::memory_order_relaxed));
     facts.hook = std::move(running.hook);
@@ -359,7 +359,7 @@ void TransactionCommit::Work::tell(std::vector<OpenChangeFacts>& all) const {
 }
 
 std::shared_ptr<Component> TransactionCommit::Work::find_awaited(const std::string& component) const {
-  const std::lock_guard lock(facts_mutex_);
+  const LockGuard lock(facts_mutex_);
   if (commit_ == nullptr || !commit_->look().is_closed()) return nullptr;
   for (std::size_t i = 0; i < touched_.size(); ++i) {
     if (touched_[i]->name() == component && !commit_->participants()[i].has_passed()) return touched_[i];

@@ -2,11 +2,11 @@
 #include "mauve_rt/data/client.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/base/waiter.hpp"
 
@@ -46,7 +46,7 @@ void ClientBase::set_name(const std::string& name) {
 }
 
 CallCounts ClientBase::counts() const {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   return counts_;
 }
 
@@ -55,7 +55,7 @@ CallOutcome ClientBase::call(FunctionRef<void()> put, FunctionRef<void()> get) n
   std::uint32_t number = 0;
   Waiter* const caller = Waiter::of_this_thread();
   {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     if (is_waiting_ || !is_connected_.load(std::memory_order_relaxed)) {
       const CallOutcome refused = is_waiting_ ? CallOutcome::busy : CallOutcome::no_server;
       count(refused, 0);
@@ -68,7 +68,7 @@ CallOutcome ClientBase::call(FunctionRef<void()> put, FunctionRef<void()> get) n
   }
   notify();
   await(number, began + timeout_ns_, caller);
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const bool has_ended = ended_.load(std::memory_order_relaxed) == number;  // relaxed: the mutex orders it
   is_posted_ = is_waiting_ = false;
   caller_ = nullptr;
@@ -89,7 +89,7 @@ void ClientBase::await(std::uint32_t number, time_ns_t until_ns, Waiter* caller)
 }
 
 bool ClientBase::take_request(std::uint32_t& number, FunctionRef<void()> get) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   if (!is_posted_) return false;
   is_posted_ = false;
   number = number_;
@@ -102,7 +102,7 @@ void ClientBase::refuse(std::uint32_t number, CallOutcome outcome) {
 }
 
 void ClientBase::end(std::uint32_t number, CallOutcome outcome, FunctionRef<void()> put) {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const bool is_late = !is_waiting_ || number != number_ || ended_.load(std::memory_order_relaxed) == number;
   if (is_late) return;
   put();

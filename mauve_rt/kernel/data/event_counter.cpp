@@ -36,7 +36,7 @@ void EventCounter::set_name(const std::string& name) {
 }
 
 DataStatus EventCounter::Read::read(EventCount& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-  const std::lock_guard lock(owner_.mutex_);
+  const LockGuard lock(owner_.mutex_);
   if (owner_.count_.data == 0) return DataStatus::none;
   value = owner_.count_;
   time_ns = owner_.time_ns_;
@@ -45,7 +45,7 @@ DataStatus EventCounter::Read::read(EventCount& value, time_ns_t& time_ns, Reade
 
 void EventCounter::Raise::raise(time_ns_t time_ns) noexcept {
   {
-    const std::lock_guard lock(owner_.mutex_);
+    const LockGuard lock(owner_.mutex_);
     ++owner_.count_.data;
     owner_.time_ns_ = time_ns;
     owner_.log(owner_.count_, time_ns);

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/data/port.hpp"
 
-#include <mutex>
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
 
@@ -94,7 +94,7 @@ void PortBase::swap(PortConnection& connection) noexcept {
   if (connection_.service != nullptr && is_counted_) connection_.service->remove_port();
   is_counted_ = true;
   if (connection.service != nullptr) connection.service->add_port();
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   MAUVE_RT_TRUSTED(std::swap(connection_, connection));  // moves: nothing is allocated, nothing freed
 }
 
@@ -103,7 +103,7 @@ bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
   if (is_safe_) return true;
   ServiceBase* service = nullptr;
   {
-    const std::lock_guard lock(shown_mutex_);  // a take that does not end may have come through here just now
+    const LockGuard lock(shown_mutex_);  // a take that does not end may have come through here just now
     service = connection_.service;
   }
   if (service == nullptr) return true;
@@ -145,8 +145,7 @@ void PortBase::preview(const PortConnection& connection) {
   stand_in->connection_ = connection;
   end_preview();
   stand_ins_.begin() = std::move(stand_in);
-  const std::lock_guard lock(
-      shown_mutex_);  // another thread's preview may end: the bit stays while there is one
+  const LockGuard lock(shown_mutex_);  // another thread's preview may end: the bit stays while there is one
   set_special(kPreviewed, kPreviewed);
 }
 
@@ -155,7 +154,7 @@ void PortBase::end_preview() noexcept {
   if (own == nullptr) return;
   if (*own != nullptr) (*own)->attach(nullptr, nullptr);
   own->reset();
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   stand_ins_.end();
   if (!stand_ins_.is_any()) set_special(kPreviewed, 0);
 }
@@ -165,7 +164,7 @@ ConnectedTo PortBase::connected_to() const {
   ConnectedTo shown;
   shown.resource.reserve(kUsualLength);
   shown.service.reserve(kUsualLength);
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   if (connection_.service == nullptr) return shown;
   shown.resource = connection_.resource;
   shown.service = connection_.service->name();

@@ -2,11 +2,11 @@
 #include "mauve_rt/data/resource.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
@@ -25,7 +25,7 @@ std::uint32_t Notifier::wait(std::uint32_t seen, time_ns_t until_ns) noexcept {
 }
 
 void EventListeners::add(EventListener& listener, const std::string& resource) {
-  const std::lock_guard change(change_mutex_);
+  const LockGuard change(change_mutex_);
   const std::size_t count = listeners_.size();
   if (count == kCapacity) {
     throw Error(ErrorCode::out_of_range, "too many wait for events of the resource",
@@ -39,15 +39,15 @@ void EventListeners::add(EventListener& listener, const std::string& resource) {
     more.reserve(std::max<std::size_t>(kFirst, 2 * count));
     more.assign(listeners_.begin(), listeners_.end());
   }
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   if (more.capacity() != 0) listeners_.swap(more);
   listeners_.push_back(&listener);
   count_.store(count + 1, std::memory_order_relaxed);
 }
 
 void EventListeners::remove(EventListener& listener) noexcept {
-  const std::lock_guard change(change_mutex_);
-  const std::lock_guard lock(mutex_);
+  const LockGuard change(change_mutex_);
+  const LockGuard lock(mutex_);
   const auto place = std::find(listeners_.begin(), listeners_.end(), &listener);
   if (place == listeners_.end()) return;
   listeners_.erase(place);
@@ -55,15 +55,15 @@ void EventListeners::remove(EventListener& listener) noexcept {
 }
 
 void EventListeners::replace(EventListener& listener, EventListener& by) noexcept {
-  const std::lock_guard change(change_mutex_);
-  const std::lock_guard lock(mutex_);
+  const LockGuard change(change_mutex_);
+  const LockGuard lock(mutex_);
   const auto place = std::find(listeners_.begin(), listeners_.end(), &listener);
   MAUVE_AUDIT(place != listeners_.end());
   if (place != listeners_.end()) *place = &by;
 }
 
 void EventListeners::call_all(Call what, time_ns_t time_ns) noexcept {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   for (EventListener* const listener : listeners_) (listener->*what)(time_ns);
 }
 
@@ -86,7 +86,7 @@ void Resource::begin_log(std::size_t /*bytes*/) {
 }
 
 std::shared_ptr<const void> Resource::use() {
-  const std::lock_guard lock(use_mutex_);
+  const LockGuard lock(use_mutex_);
   if (auto present = use_.lock()) return present;
   const std::shared_ptr<Resource> self = weak_from_this().lock();
   if (self == nullptr) return nullptr;
@@ -96,7 +96,7 @@ std::shared_ptr<const void> Resource::use() {
 }
 
 bool Resource::is_in_use() const {
-  const std::lock_guard lock(use_mutex_);
+  const LockGuard lock(use_mutex_);
   return !use_.expired();
 }
 

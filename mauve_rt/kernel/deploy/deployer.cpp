@@ -3,11 +3,9 @@
 
 #include <algorithm>
 #include <set>
-#include <thread>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
 
 #include "base/prefault.hpp"
 
@@ -19,9 +17,9 @@ constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
 
 /// The deployers of the process, for its end.
 struct Living {
-  std::mutex mutex;
-  std::set<Deployer*> deployers;
-  bool has_ended{false};
+  Mutex mutex;
+  std::set<Deployer*> deployers MAUVE_GUARDED_BY(mutex);
+  bool has_ended MAUVE_GUARDED_BY(mutex){false};
 };
 
 /// Not destroyed with static objects: a thread may end the process later.
@@ -32,38 +30,10 @@ Living& living() {
 
 }  // namespace
 
-/// The barrier that component threads and deployer meet at.
-class Deployer::Barrier {
- public:
-  explicit Barrier(std::size_t parties) : missing_(parties) {
-    pthread_barrier_init(&barrier_, nullptr, static_cast<unsigned>(parties));
-  }
-  ~Barrier() { pthread_barrier_destroy(&barrier_); }
-  Barrier(const Barrier&) = delete;
-  Barrier& operator=(const Barrier&) = delete;
-
-  pthread_barrier_t& get() noexcept { return barrier_; }
-  void created_one() {
-    MAUVE_EXPECTS(missing_ > 0);
-    --missing_;
-  }
-  void arrive() noexcept { pthread_barrier_wait(&barrier_); }
-  /// Lets those go on that have arrived, by standing in for whoever never will.
-  void stand_in() {
-    std::vector<std::thread> stand_ins;
-    for (; missing_ > 0; --missing_) stand_ins.emplace_back([this] { arrive(); });
-    for (std::thread& thread : stand_ins) thread.join();
-  }
-
- private:
-  pthread_barrier_t barrier_{};
-  std::size_t missing_;
-};
-
 Deployer::Deployer(Architecture& architecture, DeployerOptions options)
     : Host(architecture), options_(options) {
   Living& all = living();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   all.deployers.insert(this);
   has_ended_ = all.has_ended;
 }
@@ -71,7 +41,7 @@ Deployer::Deployer(Architecture& architecture, DeployerOptions options)
 Deployer::~Deployer() {
   {
     Living& all = living();
-    const std::lock_guard lock(all.mutex);
+    const LockGuard lock(all.mutex);
     all.deployers.erase(this);
   }
   shutdown();
@@ -88,9 +58,9 @@ void Deployer::prepare_process() {
 
 void Deployer::deploy() {
   architecture().change_lock().lock_alone();
-  const std::lock_guard change(architecture().change_lock(), std::adopt_lock);
+  const LockGuard change(architecture().change_lock(), std::adopt_lock);
   architecture().settle_changes();
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   if (has_ended_) {
     throw Error(ErrorCode::not_configured, "the process ends", {.remedy = "deploy in a new process"});
   }
@@ -106,7 +76,7 @@ void Deployer::deploy() {
   // Only now, all threads being ready, is there an epoch: nobody's own start-up time gets into it. Each finds its start
   // waiting when the barrier opens, which one wake-up does for all: none runs while the others' are being posted.
   start_all(monotonic_now_ns() + kDeploymentLead);
-  barrier_->arrive();
+  barrier_->arrive_and_wait();
   for (const auto& component : architecture().components()) component->task().wait_started(kForever);
   architecture().commit_gate().open();
   set_deployed(true);
@@ -121,16 +91,17 @@ void Deployer::create_threads() {
                                "wait for its end, then deploy again");
     }
   }
-  barrier_ = std::make_unique<Barrier>(components.size() + 1);
+  auto missing = static_cast<std::uint32_t>(components.size() + 1);
+  barrier_ = std::make_unique<Barrier>(missing);
   watchdog_ = std::make_shared<Watchdog>();
   try {
     for (const auto& component : components) {
-      component->task().create_thread(&barrier_->get(), options_.require_realtime, options_.trace, watchdog_);
+      component->task().create_thread(barrier_.get(), options_.require_realtime, options_.trace, watchdog_);
+      --missing;
       note_hosted(component);
-      barrier_->created_one();
     }
   } catch (...) {
-    barrier_->stand_in();
+    barrier_->arrive(missing);  // lets those go on that have arrived
     for (const auto& component : components) component->task().end_thread(kForever);
     watchdog_.reset();
     throw;
@@ -139,25 +110,25 @@ void Deployer::create_threads() {
 }
 
 void Deployer::shutdown() noexcept {
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   shut_down();
 }
 
 void Deployer::end() noexcept {
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   has_ended_ = true;
   shut_down();
 }
 
 bool Deployer::all_ended() noexcept {
   Living& all = living();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   return all.has_ended;
 }
 
 void Deployer::end_all() noexcept {
   Living& all = living();
-  const std::lock_guard lock(all.mutex);
+  const LockGuard lock(all.mutex);
   all.has_ended = true;
   for (Deployer* deployer : all.deployers) deployer->end();
 }
@@ -185,7 +156,7 @@ void Deployer::begin_task(Task& task) {
 }
 
 void Deployer::run_shadow(const std::shared_ptr<Shadow>& shadow) {
-  const std::lock_guard life(life_mutex_);
+  const LockGuard life(life_mutex_);
   if (is_deployed()) shadow_threads_.add(shadow);  // else the change finds the host shut down
 }
 

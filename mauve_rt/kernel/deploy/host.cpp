@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve {
 
@@ -195,7 +195,7 @@ void Host::attach(const std::shared_ptr<Component>& component) {
 
 bool Host::detach(Component& component) noexcept {
   if (!end_task(component.task())) return false;
-  const std::lock_guard lock(hosted_mutex_);
+  const LockGuard lock(hosted_mutex_);
   std::erase_if(hosted_, [&](const auto& each) {
     const auto held = each.lock();
     return held == nullptr || held.get() == &component;
@@ -204,13 +204,13 @@ bool Host::detach(Component& component) noexcept {
 }
 
 void Host::note_hosted(const std::shared_ptr<Component>& component) {
-  const std::lock_guard lock(hosted_mutex_);
+  const LockGuard lock(hosted_mutex_);
   const auto is_it = [&](const auto& each) { return each.lock() == component; };
   if (std::none_of(hosted_.begin(), hosted_.end(), is_it)) hosted_.push_back(component);
 }
 
 std::vector<std::shared_ptr<Component>> Host::hosted() const {
-  const std::lock_guard lock(hosted_mutex_);
+  const LockGuard lock(hosted_mutex_);
   std::vector<std::shared_ptr<Component>> all;
   for (const auto& each : hosted_) {
     if (auto component = each.lock()) all.push_back(std::move(component));

@@ -4,10 +4,11 @@
 #include <pthread.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdio>
-#include <thread>
 
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/deploy/deployer.hpp"
 
 namespace mauve {
@@ -15,7 +16,7 @@ namespace mauve {
 namespace {
 
 /// For the handler of the dump signal.
-constexpr std::chrono::milliseconds kDump{100};
+constexpr time_ns_t kDump = ms_to_ns(100);
 
 /// As nohup asks. A script has SIGINT and SIGQUIT ignored for what it starts in the background: they end the process all the
 /// same.
@@ -43,24 +44,22 @@ void block_end_signals() noexcept {
 
 int wait_end_signal(const EndOptions& options) noexcept {
   const sigset_t signals = end_signals();
-  int signal = 0;
-  while (sigwait(&signals, &signal) != 0) {
-  }
+  const int signal = await_signal(signals);
   end_process_after(options);  // first: a component that does not end must not keep the process
   Deployer::end_all();
   return signal;
 }
 
 void end_process_after(const EndOptions& options) noexcept {
-  std::thread([options] {
-    std::this_thread::sleep_for(std::chrono::nanoseconds(options.grace_ns));
+  OrdinaryThread([options] {
+    sleep_for(options.grace_ns);
     if (options.dump_signal != 0) {
-      std::thread([options] {
+      OrdinaryThread([options] {
         dprintf(STDERR_FILENO, "The process did not end within %lld ms of the signal. Its threads:\n",
                 static_cast<long long>(options.grace_ns / ms_to_ns(1)));
         raise(options.dump_signal);
       }).detach();
-      std::this_thread::sleep_for(kDump);
+      sleep_for(kDump);
     }
     _exit(options.status);
   }).detach();

@@ -7,7 +7,7 @@
 #include <tuple>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve {
 
@@ -170,7 +170,7 @@ void SimulatedHost::join() {
 
 void SimulatedHost::deploy() {
   architecture().change_lock().lock_alone();
-  const std::lock_guard change(architecture().change_lock(), std::adopt_lock);
+  const LockGuard change(architecture().change_lock(), std::adopt_lock);
   if (architecture().host() != this) join();  // it was shut down
   require_deployable();
   if (simulation_.epoch_ns_ == 0) return simulation_.deploy();

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/deploy/trace_collector.hpp"
 
-#include <chrono>
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
@@ -20,7 +19,7 @@ TraceCollector::TraceCollector(Architecture& architecture, time_ns_t period_ns)
 
 TraceCollector::~TraceCollector() {
   {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     ending_ = true;
   }
   end_.notify_one();
@@ -28,7 +27,7 @@ TraceCollector::~TraceCollector() {
 }
 
 TraceDrain TraceCollector::take() {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   TraceDrain last = architecture_.drain_trace();
   collected_.insert(collected_.end(), last.records.begin(), last.records.end());
   last.records = std::exchange(collected_, {});
@@ -36,8 +35,13 @@ TraceDrain TraceCollector::take() {
 }
 
 void TraceCollector::run() {
-  std::unique_lock lock(mutex_);
-  while (!end_.wait_for(lock, std::chrono::nanoseconds(period_ns_), [this] { return ending_; })) collect();
+  const LockGuard lock(mutex_);
+  while (!ending_) {
+    const time_ns_t next_ns = later_by(monotonic_now_ns(), period_ns_);
+    while (!ending_ && end_.wait_until(mutex_, next_ns)) {
+    }
+    if (!ending_) collect();
+  }
 }
 
 void TraceCollector::collect() {

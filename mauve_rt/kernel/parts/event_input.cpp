@@ -2,8 +2,8 @@
 #include "mauve_rt/parts/event_input.hpp"
 
 #include <algorithm>
-#include <mutex>
 
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/parts/fsm.hpp"
 
 namespace mauve {
@@ -47,8 +47,7 @@ bool EventInput::is_for_the_same(const EventInput& other) const noexcept {
 
 void EventInput::take_over(std::span<const std::unique_ptr<State>> before) noexcept {
   if (resource_ == nullptr) return is_live_.store(true, std::memory_order_relaxed);
-  const std::lock_guard lock(
-      resource_->events_mutex());  // a write tells both, or is told to the one that counts
+  const LockGuard lock(resource_->events_mutex());  // a write tells both, or is told to the one that counts
   if (const time_ns_t time = unconsumed_by_all(before); time != kNone) keep(time);
   is_live_.store(true, std::memory_order_relaxed);
 }

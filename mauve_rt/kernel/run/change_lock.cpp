@@ -2,7 +2,6 @@
 #include "mauve_rt/run/change_lock.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
@@ -66,9 +65,8 @@ void ChangeLock::lock() {
 
 void ChangeLock::lock_alone() {
   check_outside();
-  std::unique_lock lock(mutex_);
-  given_back_.wait(lock, [this] { return paused_ == 0; });
-  lock.release();
+  mutex_.lock();
+  while (paused_ != 0) given_back_.wait(mutex_);
   entered.push_back({.lock = this, .is_held = true});
 }
 
@@ -97,9 +95,7 @@ std::unique_lock<ChangeLock> ChangeLock::join_alone() {
 
 void ChangeLock::wait_for_others() {
   MAUVE_EXPECTS(is_held_here());
-  std::unique_lock lock(mutex_, std::adopt_lock);
-  given_back_.wait_for(lock, std::chrono::milliseconds(1));
-  lock.release();
+  given_back_.wait_until(mutex_, monotonic_now_ns() + ms_to_ns(1));
 }
 
 ChangeLock::Pause::Pause(ChangeLock& lock) : lock_(lock) {

@@ -7,7 +7,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
 #include "mauve_rt/run/task.hpp"
 

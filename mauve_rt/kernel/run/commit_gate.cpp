@@ -2,7 +2,6 @@
 #include "mauve_rt/run/commit_gate.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/run/commit.hpp"

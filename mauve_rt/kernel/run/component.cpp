@@ -5,7 +5,7 @@
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/prefault.hpp"
@@ -116,19 +116,19 @@ void Component::set_parts(Parts parts) {
 }
 
 ShownParts Component::shown() const {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   ShownParts shown = shown_;
   shown.core = TraceNames::word(core_name_.load(std::memory_order_relaxed));
   return shown;
 }
 
 std::shared_ptr<const StateTimes> Component::state_times() const {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   return shown_times_;
 }
 
 std::vector<DescribedState> Component::described_states() const {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   return shown_states_;
 }
 
@@ -164,7 +164,7 @@ void Component::show() {
   for (const auto& property : parts_.shell->properties())
     now.properties.push_back({property->name(), property->boxed(), property->options()});
   std::vector<DescribedState> states = fsm.describe_states();
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   shown_ = std::move(now);
   shown_states_ = std::move(states);
   shown_times_ = fsm.times();

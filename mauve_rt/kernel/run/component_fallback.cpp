@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The fallback core of a component: made ready with the component, and anew after changes.
 #include <algorithm>
-#include <chrono>
-#include <thread>
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/run/component.hpp"
 
 #include "base/prefault.hpp"
@@ -17,7 +16,7 @@ namespace mauve {
 namespace {
 
 /// How often a renewal looks whether the component is claimed: no thread tells it.
-constexpr std::chrono::milliseconds kClaimedLook{5};
+constexpr time_ns_t kClaimedLook = ms_to_ns(5);
 
 /// Another core of that name, of the generation that is in force by now; nullptr: the core is of that one.
 std::unique_ptr<CoreBase> rebuilt_core(const PluginRegistry* registry, const CoreBase& core) {
@@ -121,10 +120,10 @@ class Component::FallbackRenewal {
   }
   template <typename Part>
   bool run_claimed(ArchitecturePresence& presence, const Part& part) {
-    for (;; std::this_thread::sleep_for(kClaimedLook)) {
+    for (;; sleep_for(kClaimedLook)) {
       const std::shared_lock use(presence.mutex);
       if (presence.architecture == nullptr) return false;
-      const std::lock_guard change(presence.architecture->change_lock());
+      const LockGuard change(presence.architecture->change_lock());
       CommitGate& gate = presence.architecture->commit_gate();
       ChangeMark& mark = component_.change_mark_;
       {

@@ -14,14 +14,14 @@ constexpr time_ns_t kParkedLook = ms_to_ns(20);
 }  // namespace
 
 std::shared_ptr<Probation> Component::present_probation() const {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   // Under this mutex the change that has it does not let go of it.
   Probation* const next = next_probation_.load(std::memory_order_acquire);
   return next != nullptr ? next->weak_from_this().lock() : probation_;
 }
 
 std::vector<ProbationRecord> Component::probations() const {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   std::vector<ProbationRecord> records;
   if (last_probation_) records.push_back(*last_probation_);
   if (probation_ != nullptr) records.push_back(probation_->record());
@@ -33,7 +33,7 @@ std::vector<ProbationRecord> Component::probations() const {
 void Component::keep_probation(std::unique_ptr<PartsChange> parts) {
   auto probation = parts->release_probation();
   probation->keep(std::move(parts));
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   next_probation_.store(nullptr, std::memory_order_relaxed);  // relaxed: under the mutex
   probation_ = std::move(probation);
 }
@@ -55,7 +55,7 @@ void Component::conclude_probation() noexcept {
 void Component::settle_probation(bool at_once) noexcept {
   std::shared_ptr<Probation> probation;
   {
-    const std::lock_guard lock(shown_mutex_);
+    const LockGuard lock(shown_mutex_);
     probation = probation_;
   }
   if (probation == nullptr || !probation->has_ended()) return;
@@ -66,7 +66,7 @@ void Component::settle_probation(bool at_once) noexcept {
     dispose(std::move(parts), is_fsm_back, at_once);
   }
   ProbationRecord record = probation->record();
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   last_probation_ = std::move(record);
   probation_.reset();
 }

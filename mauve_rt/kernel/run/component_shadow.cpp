@@ -5,12 +5,12 @@
 namespace mauve {
 
 std::shared_ptr<Shadow> Component::last_shadow() const {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   return shadow_;
 }
 
 void Component::keep_shadow(std::shared_ptr<Shadow> shadow) {
-  const std::lock_guard lock(shown_mutex_);
+  const LockGuard lock(shown_mutex_);
   shadow_.swap(shadow);
 }
 

@@ -8,7 +8,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/component.hpp"
 
 namespace mauve {
@@ -263,12 +263,12 @@ void Probation::conclude(ProbationCause why) noexcept {
 // ---- ordinary threads
 
 void Probation::name_request(const std::string& reason) {
-  const std::lock_guard lock(request_mutex_);
+  const LockGuard lock(request_mutex_);
   if (request_.empty()) request_ = reason;
 }
 
 void Probation::request(const std::string& reason) {
-  const std::lock_guard lock(request_mutex_);
+  const LockGuard lock(request_mutex_);
   if (is_requested_.load(std::memory_order_relaxed))
     return;  // relaxed: under the mutex; the first one counts
   request_ = reason;
@@ -322,7 +322,7 @@ bool Probation::claim_comeback() noexcept {
 }
 
 void Probation::note_left_out(const std::string& why) {
-  const std::lock_guard lock(request_mutex_);
+  const LockGuard lock(request_mutex_);
   left_out_ = why;
 }
 
@@ -379,7 +379,7 @@ std::string Probation::reason() const {
       return text;
     }
     case ProbationCause::request: {
-      const std::lock_guard lock(request_mutex_);
+      const LockGuard lock(request_mutex_);
       return request_;
     }
     case ProbationCause::too_few:
@@ -390,7 +390,7 @@ std::string Probation::reason() const {
     case ProbationCause::fell_back:
       return "the core faulted, which on_fault did not watch, and the fallback core took over";
     case ProbationCause::hung: {
-      const std::lock_guard lock(request_mutex_);
+      const LockGuard lock(request_mutex_);
       const std::string what = component_.task().fault().what;
       if (left_out_.empty())
         return what + "; the old core goes on by another thread, " +

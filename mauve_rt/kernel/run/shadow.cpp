@@ -2,12 +2,11 @@
 // A shadow's life; how it executes its candidate is in shadow_execution.cpp.
 #include "mauve_rt/run/shadow.hpp"
 
-#include <chrono>
-#include <thread>
 #include <typeinfo>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/run/component.hpp"
 #include "mauve_rt/run/shadow_thread.hpp"
 
@@ -18,7 +17,7 @@ namespace mauve {
 namespace {
 
 /// How often a requester looks whether the candidate's state has ended.
-constexpr std::chrono::microseconds kShadowLook{500};
+constexpr time_ns_t kShadowLook = us_to_ns(500);
 
 std::string name_of(const CoreBase& core) {
   return core.implementation().empty() ? "(an object)" : core.implementation();
@@ -198,7 +197,7 @@ std::unique_ptr<CoreBase> Shadow::suspend(time_ns_t timeout_ns) {
            .expected = "the end of the state within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
            .remedy = "try again, or end the shadow"});
     }
-    std::this_thread::sleep_for(kShadowLook);
+    sleep_for(kShadowLook);
   }
   if (phase_.load(std::memory_order_acquire) == kRunning && parts_.core != nullptr)
     return std::move(parts_.core);
@@ -216,7 +215,7 @@ void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
   }
   core->set_context(&machine_.context());
   {
-    const std::lock_guard run(run_mutex_);  // it executes nothing without its core
+    const LockGuard run(run_mutex_);  // it executes nothing without its core
     if (is_retired_) return core->cleanup();
     parts_.core = std::move(core);
   }
@@ -224,7 +223,7 @@ void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
 }
 
 void Shadow::set_property(const std::string& name, const PropertyValue& value) {
-  const std::lock_guard lock(figures_mutex_);
+  const LockGuard lock(figures_mutex_);
   properties_.emplace_back(name, value);
 }
 
@@ -237,7 +236,7 @@ ShadowRecord Shadow::record() const {
                       .releases = static_cast<std::int64_t>(capture_.captured()),
                       .skipped_late = static_cast<std::int64_t>(capture_.skipped()),
                       .budget_ns = options_.budget_ns};
-  const std::lock_guard lock(figures_mutex_);
+  const LockGuard lock(figures_mutex_);
   if (phase == kEnded) {
     record.verdict = cause_ == ShadowCause::fault       ? ShadowVerdict::faulted
                      : cause_ == ShadowCause::promotion ? ShadowVerdict::promoted
@@ -255,7 +254,6 @@ ShadowRecord Shadow::record() const {
   return record;
 }
 
-/// figures_mutex_ held.
 std::string Shadow::reason() const {
   switch (cause_) {
     case ShadowCause::none:

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // How a shadow executes its candidate: on the shadow's thread, or in a simulation.
-#include <ctime>
-
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/run/shadow.hpp"
 
@@ -10,12 +8,6 @@
 namespace mauve {
 
 namespace {
-
-time_ns_t thread_cpu_ns() noexcept {
-  timespec time{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
-  return s_to_ns(time.tv_sec) + time.tv_nsec;
-}
 
 /// What the candidate marks in the trace goes nowhere: in a simulation the ring at hand is the component's.
 class WithoutRing {
@@ -32,7 +24,7 @@ class WithoutRing {
 }  // namespace
 
 bool Shadow::run_pending() noexcept {
-  const std::lock_guard run(run_mutex_);
+  const LockGuard run(run_mutex_);
   const ShadowCapture::Release* const release = capture_.front();
   if (phase_.load(std::memory_order_acquire) != kRunning || release == nullptr || parts_.core == nullptr)
     return false;
@@ -57,7 +49,7 @@ void Shadow::execute(const ShadowCapture::Release& release) {
   is_anew_ = is_anew_ || release.is_anew;
   if (debt_ > 0) {
     --debt_;
-    const std::lock_guard lock(figures_mutex_);
+    const LockGuard lock(figures_mutex_);
     ++figures_.skipped_budget;
     return;
   }
@@ -65,18 +57,18 @@ void Shadow::execute(const ShadowCapture::Release& release) {
   put_inputs();
   clock_->set_now(release.instant_ns);
   const WithoutRing none;
-  const time_ns_t began_ns = thread_cpu_ns();
+  const time_ns_t began_ns = thread_cpu_now_ns();
   const bool has_executed = advance_to(release);
   const bool is_virtual = signal_ == nullptr;
-  const time_ns_t execution_ns = is_virtual ? clock_->spent_ns() : thread_cpu_ns() - began_ns;
-  const std::lock_guard lock(figures_mutex_);
+  const time_ns_t execution_ns = is_virtual ? clock_->spent_ns() : thread_cpu_now_ns() - began_ns;
+  const LockGuard lock(figures_mutex_);
   ++(has_executed ? figures_.compared : figures_.idle);
   if (has_executed) count_execution(execution_ns);
   compare(release);
 }
 
 void Shadow::take_properties() {
-  const std::lock_guard lock(figures_mutex_);
+  const LockGuard lock(figures_mutex_);
   for (auto& [name, value] : properties_) {
     if (PropertyBase* property = parts_.shell->find_property(name)) property->swap(value);
   }
@@ -111,7 +103,6 @@ bool Shadow::advance_to(const ShadowCapture::Release& release) {
   return true;
 }
 
-/// figures_mutex_ held.
 void Shadow::compare(const ShadowCapture::Release& release) {
   for (auto& [place, comparison] : comparisons_) {
     const void* const live = capture_.note(place).is_noted ? capture_.value(place) : nullptr;
@@ -119,7 +110,6 @@ void Shadow::compare(const ShadowCapture::Release& release) {
   }
 }
 
-/// figures_mutex_ held.
 void Shadow::count_execution(time_ns_t execution_ns) {
   figures_.largest_execution_ns = std::max(figures_.largest_execution_ns, execution_ns);
   if (execution_ns <= options_.budget_ns) return;
@@ -129,7 +119,7 @@ void Shadow::count_execution(time_ns_t execution_ns) {
 
 void Shadow::fault(const std::string& what, time_ns_t instant_ns) {
   {
-    const std::lock_guard lock(figures_mutex_);
+    const LockGuard lock(figures_mutex_);
     fault_ = what + " in state " + TraceNames::word(machine_.state_name());
   }
   conclude(ShadowCause::fault, signal_ == nullptr ? instant_ns : monotonic_now_ns());

@@ -3,13 +3,12 @@
 #include "mauve_rt/run/task.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cstring>
-#include <thread>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 
 namespace mauve {
 
@@ -18,7 +17,7 @@ namespace {
 /// An instant that a thread can still be woken for in time.
 constexpr time_ns_t kStartMargin = us_to_ns(200);
 /// For a lock that a commit may hold for long.
-constexpr std::chrono::microseconds kBetweenTries{500};
+constexpr time_ns_t kBetweenTries = us_to_ns(500);
 /// What lasts for so many periods, and so long, is told as hung where no other figure was set.
 constexpr std::int64_t kHungPeriods = 10;
 constexpr time_ns_t kHungAtLeast = s_to_ns(1);
@@ -70,7 +69,7 @@ Task::~Task() { end_thread(kForever); }
 
 void Task::retract_fallback() noexcept {
   fallback_.exchange(nullptr, std::memory_order_acq_rel);
-  while (is_falling_back_.load(std::memory_order_acquire)) std::this_thread::yield();
+  while (is_falling_back_.load(std::memory_order_acquire)) yield_thread();
 }
 
 void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
@@ -82,7 +81,7 @@ void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
 
 void Task::swap_fault(FaultNote& note) noexcept {
-  const std::lock_guard lock(fault_mutex_);
+  const LockGuard lock(fault_mutex_);
   MAUVE_RT_TRUSTED(std::swap(fault_, note));  // moves: nothing is allocated, nothing freed
 }
 
@@ -96,7 +95,7 @@ void Task::clear_fault() noexcept {
 Fault Task::fault() const {
   FaultNote note;
   {
-    const std::lock_guard lock(fault_mutex_);
+    const LockGuard lock(fault_mutex_);
     note = fault_;
   }
   if (note.when_ns == 0) return {};
@@ -126,7 +125,7 @@ StateAge Task::state_age() const {
 }
 
 void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, std::uint64_t& dropped) {
-  const std::lock_guard lock(ring_mutex_);
+  const LockGuard lock(ring_mutex_);
   if (ring_ == nullptr) return;
   ring_->drain(into);
   written += ring_->offered();
@@ -135,14 +134,14 @@ void Task::drain_ring(std::vector<TraceRecord>& into, std::uint64_t& written, st
 
 std::unique_ptr<TraceRing> Task::release_ring() {
   MAUVE_EXPECTS(has_ended());
-  const std::lock_guard lock(ring_mutex_);
+  const LockGuard lock(ring_mutex_);
   machine_.set_ring(nullptr);
   return std::move(ring_);
 }
 
 void Task::begin_trace(bool trace) {
   MAUVE_EXPECTS(!has_thread());
-  const std::lock_guard lock(ring_mutex_);
+  const LockGuard lock(ring_mutex_);
   if (!trace) {
     ring_.reset();
   } else if (ring_ == nullptr) {
@@ -175,7 +174,7 @@ bool Task::end_thread(time_ns_t until_ns) noexcept {
   // Tried again and again: ThreadSanitizer does not know the timed lock of the monotonic clock.
   while (!lock.try_lock()) {
     if (monotonic_now_ns() >= until_ns) return false;
-    std::this_thread::sleep_for(kBetweenTries);
+    sleep_for(kBetweenTries);
   }
   if (!has_thread_) return true;
   control_.fetch_or(kStop | kExit, std::memory_order_acq_rel);
@@ -199,7 +198,7 @@ void Task::detach_thread() noexcept {
 }
 
 void Task::start_at(time_ns_t instant_ns) {
-  const std::lock_guard lock(command_mutex_);
+  const LockGuard lock(command_mutex_);
   post_start(instant_ns);
 }
 
@@ -208,7 +207,7 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
   start_at_ns_ = instant_ns;
   started_.store(0, std::memory_order_relaxed);  // relaxed: kStart publishes it
   {
-    const std::lock_guard lock(order_mutex_);
+    const LockGuard lock(order_mutex_);
     // A stop bit that came too late for the last run must not end this one: store, not or.
     control_.store(kStart, std::memory_order_release);
   }
@@ -226,8 +225,8 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
                  .remedy = remedy});
   };
   if (!command_mutex_.try_lock_until(until))
-    throw_late("a commit or another command of the component lasts; it was not started", "try again");
-  const std::lock_guard lock(command_mutex_, std::adopt_lock);
+    return throw_late("a commit or another command of the component lasts; it was not started", "try again");
+  const LockGuard lock(command_mutex_, std::adopt_lock);
   if (state() == ComponentState::stopped && !simulated_ && !wait_slot(until))
     throw_late("the component has yet to take an earlier change; it was not started", "try again");
   // A change posts a start and goes on: the thread may be taking it up, and reads what the next one would write.
@@ -305,7 +304,7 @@ void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
 
 /// The state and the bit go together: a stop that is late must not end the run that follows.
 void Task::order_stop() {
-  const std::lock_guard lock(order_mutex_);
+  const LockGuard lock(order_mutex_);
   auto seen = state_.load(std::memory_order_acquire);
   while (static_cast<ComponentState>(seen) == ComponentState::running) {
     // acq_rel: a fault in between wins
@@ -329,7 +328,7 @@ bool Task::is_called_from_own_state() const noexcept {
 
 /// A start that the thread has not taken up yet; false when there is none.
 bool Task::withdraw_start() noexcept {
-  const std::lock_guard lock(order_mutex_);
+  const LockGuard lock(order_mutex_);
   if (state() != ComponentState::stopped) return false;
   if ((control_.fetch_and(~kStart, std::memory_order_acq_rel) & kStart) == 0) return false;
   started_.store(1, std::memory_order_release);  // who waits for it waits in vain

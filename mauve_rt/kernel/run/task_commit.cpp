@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A task's part in the probation of its core (probation.hpp): it finds violations, and puts the old core back.
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/probation.hpp"
 #include "mauve_rt/run/task.hpp"
 
@@ -77,7 +77,7 @@ bool Task::leaves_core_to_change() noexcept {
 bool Task::note_fault_on_probation() noexcept {
   bool is_violation = false;
   probation_.use([&](Probation& probation) {
-    const std::lock_guard lock(fault_mutex_);
+    const LockGuard lock(fault_mutex_);
     is_violation = probation.note_fault(fault_);
   });
   return is_violation;
@@ -136,7 +136,7 @@ bool Task::put_back_after_fault(bool has_taken_change) noexcept {
 
 void Task::put_back_parked(Probation& probation) noexcept {
   if (!command_mutex_.try_lock()) return;
-  const std::lock_guard lock(command_mutex_, std::adopt_lock);
+  const LockGuard lock(command_mutex_, std::adopt_lock);
   if (is_parked() && probation.note_request() && probation.put_back()) signal_change();
 }
 

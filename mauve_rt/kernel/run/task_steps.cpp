@@ -4,8 +4,8 @@
 #include <utility>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {

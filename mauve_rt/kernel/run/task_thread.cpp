@@ -6,7 +6,7 @@
 #include <cstring>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/task.hpp"
 #include "mauve_rt/run/watchdog.hpp"
 
@@ -24,10 +24,10 @@ thread_local const Task* task_simulated_here = nullptr;
 
 }  // namespace
 
-void Task::create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace,
+void Task::create_thread(Barrier* barrier, bool require_realtime, bool trace,
                          std::shared_ptr<Watchdog> watchdog) {
   if (!end_thread(0)) throw_state_running("the component's thread has not ended", 0, kLeftBehindRemedy);
-  const std::lock_guard lock(command_mutex_);
+  const LockGuard lock(command_mutex_);
   watchdog_ = std::move(watchdog);
   machine_.set_watchdog(watchdog_.get());
   demoted_ = false;
@@ -89,7 +89,7 @@ void Task::thread_main() noexcept {
   counters_.attach();
   ready_.store(1, std::memory_order_release);
   futex_wake_all(ready_);
-  if (barrier_ != nullptr) pthread_barrier_wait(barrier_);
+  if (barrier_ != nullptr) barrier_->arrive_and_wait();
   for (;;) {
     const std::uint32_t control = control_.load(std::memory_order_acquire);
     if (!machine_.is_started() && (control & kExit) != 0) break;

@@ -2,10 +2,10 @@
 #include "mauve_rt/run/watchdog.hpp"
 
 #include <algorithm>
-#include <mutex>
 
 #include "mauve_rt/base/error.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/run/task.hpp"
 
 #include "base/touch_stack.hpp"
@@ -53,12 +53,12 @@ void Watchdog::stop() noexcept {
 }
 
 void Watchdog::watch(Task& task) {
-  const std::lock_guard lock(tasks_mutex_);
+  const LockGuard lock(tasks_mutex_);
   tasks_.push_back(&task);
 }
 
 void Watchdog::forget(Task& task) noexcept {
-  const std::lock_guard lock(tasks_mutex_);
+  const LockGuard lock(tasks_mutex_);
   std::erase(tasks_, &task);
 }
 
@@ -102,7 +102,7 @@ time_ns_t Watchdog::look(time_ns_t now_ns) noexcept {
   const time_ns_t soonest_ns = now_ns + kLeastBetweenLooks;
   time_ns_t earliest_ns = kForever;
   {
-    const std::lock_guard lock(tasks_mutex_);
+    const LockGuard lock(tasks_mutex_);
     for (Task* task : tasks_) {
       task->time_out_if_over(now_ns);
       earliest_ns = std::min(earliest_ns, task->earliest_excess_ns());
@@ -115,7 +115,7 @@ time_ns_t Watchdog::look(time_ns_t now_ns) noexcept {
 
 /// Takes the next one with outputs left; it stays while they are being written.
 Task* Watchdog::next_left(std::size_t& place) noexcept {
-  const std::lock_guard lock(tasks_mutex_);
+  const LockGuard lock(tasks_mutex_);
   while (place < tasks_.size()) {
     Task* const task = tasks_[place++];
     if (task->take_outputs_left()) return task;

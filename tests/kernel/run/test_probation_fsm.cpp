@@ -133,7 +133,6 @@ class FsmProbations : public Probations<Way> {
     }
   }
 
-
   std::vector<time_ns_t> executed_ns;
 };
 TYPED_TEST_SUITE(FsmProbations, EveryHost, HostNames);

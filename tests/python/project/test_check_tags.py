@@ -34,6 +34,7 @@ def check(root: Path, code: str) -> list[str]:
         "/// All functions [rt].\nstruct Pair {\n  int sum() const MAUVE_RT { return a; }\n  int a{};\n};",
         "struct Given {\n  Given() = default;\n  bool operator==(const Given&) const = default;\n};",
         "class Made {\n public:\n  explicit Made(int n) : n_{n} {}\n  ~Made();\n\n private:\n  int n_;\n};",
+        "class MAUVE_GUARD Held {\n public:\n  explicit Held(int& n) MAUVE_ACQUIRE(n);\n  ~Held();\n};",
         "struct Derived : Base {\n  void write() noexcept override;\n};",
         "class Secret {\n  void write();\n\n protected:\n  void put();\n};",
         "class Outer {\n  struct Inner {\n    int get();\n  };\n};",

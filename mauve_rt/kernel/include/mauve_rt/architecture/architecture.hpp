@@ -8,9 +8,7 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <optional>
-#include <shared_mutex>
 #include <string>
 #include <vector>
 
@@ -20,6 +18,8 @@
 #include "mauve_rt/architecture/open_change.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/base/seam/shared_mutex.hpp"
 #include "mauve_rt/change/transaction.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/run/change_lock.hpp"
@@ -70,7 +70,7 @@ enum class EarlierChange : std::uint8_t {
 /// | architecture | its end          | anyone  | mutex, shared by readers: no user code    |
 /// | renewals     | who renews       | its end | acq_rel: what a renewal did before it ended |
 struct ArchitecturePresence {
-  std::shared_mutex mutex;
+  SharedMutex mutex;
   Architecture* architecture;
   std::atomic<int> renewals{0};  // of fallback cores, that are not over
 };
@@ -281,7 +281,7 @@ class Architecture final : public Configurable {
   /// Throws Error (timeout): another change lasts, or a component, which is named, has not taken one. [non-rt], change lock held.
   [[noreturn]] void throw_earlier(EarlierChange earlier, time_ns_t waited_ns) const;
   /// The host, in use until the lock goes; it has no host, or one that ends, where that owns nothing. [non-rt], change lock held.
-  Runner* use_host(std::shared_lock<std::shared_mutex>& use) const;
+  Runner* use_host(std::shared_lock<SharedMutex>& use) const;
   /// Lets go of those that a change has made stale, before what they refer to goes. [non-rt], the change lock held.
   void drop_stale_prepared() noexcept;
   /// [non-rt], the change lock held.
@@ -338,12 +338,12 @@ class Architecture final : public Configurable {
   void retire_trace(Task& task);
 
  private:
-  /// A new number that the trace knows the name by. list_mutex_ held. Throws Error (out_of_range): all are used up.
-  std::uint16_t give_number(const std::string& name);
-  /// The number of a component of that name that is gone. list_mutex_ held.
-  std::optional<std::uint16_t> find_free_number(const std::string& name) const;
-  /// Keeps records until the next drain; of too many the oldest are lost. trace_mutex_ held.
-  void keep_records(const std::vector<TraceRecord>& records);
+  /// A new number that the trace knows the name by. Throws Error (out_of_range): all are used up.
+  std::uint16_t give_number(const std::string& name) MAUVE_REQUIRES(list_mutex_);
+  /// The number of a component of that name that is gone.
+  std::optional<std::uint16_t> find_free_number(const std::string& name) const MAUVE_REQUIRES(list_mutex_);
+  /// Keeps records until the next drain; of too many the oldest are lost.
+  void keep_records(const std::vector<TraceRecord>& records) MAUVE_REQUIRES(trace_mutex_);
 
   struct Leaving {
     std::shared_ptr<Component> component;
@@ -365,23 +365,23 @@ class Architecture final : public Configurable {
   mutable CommitGate commit_gate_;
   ArchitectureClaims claims_;
   std::vector<OpenChange*> prepared_;
-  mutable std::mutex open_mutex_;  // for a moment: no hook, and no other lock of a change but Work's facts
+  mutable Mutex open_mutex_;  // for a moment: no hook, and no other lock of a change but Work's facts
   std::vector<std::shared_ptr<OpenChange>> open_;
   std::atomic<bool> has_open_{false};
-  mutable std::mutex host_mutex_;
-  Runner* host_{nullptr};
+  mutable Mutex host_mutex_;
+  Runner* host_ MAUVE_GUARDED_BY(host_mutex_){nullptr};
   ChangeSignal changes_;
   Authors authors_;
   Notifier publications_;
   std::atomic<time_ns_t> deployment_epoch_ns_{0};
-  mutable std::mutex list_mutex_;
-  std::vector<std::string> names_;  // by number
-  std::map<std::uint16_t, std::weak_ptr<const Component>>
-      numbered_;  // who has a number; absent: no component ever had
-  std::mutex trace_mutex_;
-  std::deque<TraceRecord> retired_;
-  std::vector<Final> finals_;  // by number
-  std::vector<std::shared_ptr<Resource>> retiring_;
+  mutable Mutex list_mutex_;
+  std::vector<std::string> names_ MAUVE_GUARDED_BY(list_mutex_);  // by number
+  std::map<std::uint16_t, std::weak_ptr<const Component>> numbered_
+      MAUVE_GUARDED_BY(list_mutex_);  // who has a number; absent: no component ever had
+  Mutex trace_mutex_;
+  std::deque<TraceRecord> retired_ MAUVE_GUARDED_BY(trace_mutex_);
+  std::vector<Final> finals_ MAUVE_GUARDED_BY(trace_mutex_);  // by number
+  std::vector<std::shared_ptr<Resource>> retiring_ MAUVE_GUARDED_BY(list_mutex_);
   std::vector<Leaving> leaving_;
   Lists lists_;
   std::shared_ptr<ArchitecturePresence> presence_;

@@ -3,10 +3,11 @@
 #pragma once
 
 #include <map>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
 
@@ -36,8 +37,8 @@ class Authors {
   std::vector<Authored> all() const;
 
  private:
-  mutable std::mutex mutex_;
-  std::map<std::pair<std::string, std::string>, std::string> by_;
+  mutable Mutex mutex_;
+  std::map<std::pair<std::string, std::string>, std::string> by_ MAUVE_GUARDED_BY(mutex_);
 };
 
 }  // namespace mauve

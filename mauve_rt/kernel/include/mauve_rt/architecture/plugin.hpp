@@ -8,13 +8,13 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "mauve_rt/architecture/given_resources.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/parts/core.hpp"
@@ -126,7 +126,7 @@ class PluginRegistry {
   /// A data type: makes ports possible, and the given kinds of resources that can be of it.
   template <Described T>
   void type() {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     // Ports of the C++ type that the resources are of, whoever else registers the name later.
     if (add_given<T>(type_name<T>())) ports_.insert_or_assign(type_name<T>(), data_ports<T>());
   }
@@ -134,7 +134,7 @@ class PluginRegistry {
   /// The type of a ROS service: makes clients of it possible. Ports and offered calls need no registration.
   template <DescribedCall S>
   void call_type() {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     add_given<S>(std::string(CallTraits<S>::name));
   }
 
@@ -243,16 +243,17 @@ class PluginRegistry {
   /// For which builds of their classes new cores and fsms were compiled: those in force, or of the same generation.
   void note_builds();
   [[noreturn]] void throw_unknown_type(const std::string& type) const;
-  [[noreturn]] void throw_not_of_type(const ResourceKind& kind, const std::string& type) const;
+  [[noreturn]] void throw_not_of_type(const ResourceKind& kind, const std::string& type) const
+      MAUVE_REQUIRES(mutex_);
 
-  mutable std::recursive_mutex mutex_;  // a library registers its parts under it
-  std::set<std::string> libraries_;
-  std::string loading_;  // the library that registers its parts now
+  mutable RecursiveMutex mutex_;  // a library registers its parts under it
+  std::set<std::string> libraries_ MAUVE_GUARDED_BY(mutex_);
+  std::string loading_ MAUVE_GUARDED_BY(mutex_);  // the library that registers its parts now
   Entries<Shell> shells_;
   Entries<CoreBase> cores_;
   Entries<FsmBase> fsms_;
-  Kinds resources_;                             // by kind
-  std::map<std::string, PortFactories> ports_;  // by type
+  Kinds resources_;                                                      // by kind
+  std::map<std::string, PortFactories> ports_ MAUVE_GUARDED_BY(mutex_);  // by type
   // acquire/release: who sees the new number finds the new entries
   std::atomic<std::uint32_t> version_{0};
   int generation_{1};                           // of what is added

@@ -4,10 +4,9 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
-#include <shared_mutex>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/shared_mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -46,7 +45,7 @@ class Runner {
   virtual void run_shadow(const std::shared_ptr<Shadow>& shadow) = 0;
   /// Held while a change uses the runner, which may end meanwhile where this owns nothing. [non-rt], the architecture's change
   /// lock held.
-  std::shared_lock<std::shared_mutex> use() { return std::shared_lock(in_use_, std::try_to_lock); }
+  std::shared_lock<SharedMutex> use() { return std::shared_lock(in_use_, std::try_to_lock); }
 
  protected:
   /// From here on nobody starts anything, and no change of a running architecture is made.
@@ -55,12 +54,12 @@ class Runner {
     deployed_.store(deployed, std::memory_order_seq_cst);
   }
   /// Waits for the changes that use the runner; after shutdown(), at its end. [non-rt]
-  void wait_unused() noexcept { const std::lock_guard lock(in_use_); }
+  void wait_unused() noexcept { const LockGuard lock(in_use_); }
 
  private:
   std::atomic<bool> deployed_{false};
   std::atomic<std::uint32_t> deployments_{0};
-  std::shared_mutex in_use_;
+  SharedMutex in_use_;
 };
 
 }  // namespace mauve

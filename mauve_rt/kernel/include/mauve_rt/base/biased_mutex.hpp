@@ -7,8 +7,8 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
-#include "mauve_rt/base/process_barrier.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/process_barrier.hpp"
 #include "mauve_rt/base/this_thread.hpp"
 
 namespace mauve {
@@ -31,7 +31,7 @@ namespace mauve {
 /// | Seat::inside_   | the seat's user            | who holds mutex_ | after inside_ the user looks at owner_, after owner_ the other one at inside_: a barrier between each; release: who finds 0 sees what the user wrote |
 /// | Seat::handover_ | both                       | both             | seq_cst: a futex word; one of them sees the other        |
 /// | Seat::id_       | the seat's user            | any              | relaxed: the user finds what it stored itself            |
-class BiasedMutex {
+class MAUVE_LOCK BiasedMutex {
  public:
   /// Of one thread at a time.
   class Seat {
@@ -63,17 +63,17 @@ class BiasedMutex {
   };
 
   /// Holds the mutex to the end of a block: by the seat, or as one of the others.
-  class Hold {
+  class MAUVE_GUARD Hold {
    public:
     /// [rt]
-    Hold(BiasedMutex& mutex, Seat* seat) MAUVE_RT : mutex_(mutex), seat_(seat) {
+    Hold(BiasedMutex& mutex, Seat* seat) MAUVE_RT MAUVE_ACQUIRE(mutex) : mutex_(mutex), seat_(seat) {
       if (seat_ == nullptr) {
         mutex_.lock();
       } else if (!mutex_.enter(*seat_)) {
         seat_ = nullptr;
       }
     }
-    ~Hold() {
+    ~Hold() MAUVE_RELEASE() {
       if (seat_ != nullptr) {
         mutex_.leave(*seat_);
       } else {
@@ -93,11 +93,11 @@ class BiasedMutex {
   BiasedMutex& operator=(const BiasedMutex&) = delete;
 
   /// As one without a seat. [rt]
-  void lock() MAUVE_RT;
+  void lock() MAUVE_RT MAUVE_ACQUIRE();
   /// Locks if no user is inside; never waits. [rt]
-  bool try_lock() MAUVE_RT;
+  bool try_lock() MAUVE_RT MAUVE_TRY_ACQUIRE(true);
   /// [rt]
-  void unlock() MAUVE_RT;
+  void unlock() MAUVE_RT MAUVE_RELEASE();
 
   /// Gives a seat. It must not move, and its user is not inside. [rt] Waits for the user of the only other seat to leave.
   void add(Seat& seat) MAUVE_RT;
@@ -113,7 +113,7 @@ class BiasedMutex {
 
  private:
   /// True: by the bias, to be left by leave(). False: by lock().
-  bool enter(Seat& seat) MAUVE_RT {
+  bool enter(Seat& seat) MAUVE_RT MAUVE_LOCKS_UNSEEN {
     if (owner_.load(std::memory_order_relaxed) == &seat) [[likely]] {  // relaxed: a hint
       MAUVE_AUDIT(seat.inside_.load(std::memory_order_relaxed) == 0);  // relaxed: this thread wrote it last
       seat.inside_.store(seat.take_thread(), std::memory_order_relaxed);
@@ -131,15 +131,15 @@ class BiasedMutex {
     if (owner_.load(std::memory_order_relaxed) != &seat) [[unlikely]]
       seat.hand_over();
   }
-  void lock_with(Seat& seat) MAUVE_RT;
-  void revoke(Seat& granted) MAUVE_RT;
-  void grant() MAUVE_RT;
+  void lock_with(Seat& seat) MAUVE_RT MAUVE_ACQUIRE();
+  void revoke(Seat& granted) MAUVE_RT MAUVE_REQUIRES(mutex_);
+  void grant() MAUVE_RT MAUVE_REQUIRES(this);
 
   std::atomic<Seat*> owner_{nullptr};
   PiMutex mutex_;
   std::atomic<Seat*> granted_{nullptr};
-  Seat* first_{nullptr};
-  bool is_shared_{false};
+  Seat* first_ MAUVE_GUARDED_BY(this){nullptr};
+  bool is_shared_ MAUVE_GUARDED_BY(this){false};
 };
 
 }  // namespace mauve

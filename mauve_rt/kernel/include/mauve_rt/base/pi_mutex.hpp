@@ -2,12 +2,12 @@
 // A priority-inheritance mutex that traces contention and knows how many its thread holds.
 #pragma once
 
-#include <pthread.h>
-
 #include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/inheriting_lock.hpp"
+#include "mauve_rt/base/thread_safety.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -23,21 +23,21 @@ namespace mauve {
 /// | depth_    | lock, unlock          | mutex_        | yes |
 /// | below_    | lock, unlock          | mutex_        | yes |
 /// | trace_id_ | set_trace_id [setup]  | before start  | no  |
-class PiMutex {
+class MAUVE_LOCK PiMutex {
  public:
-  PiMutex();
+  PiMutex() = default;
   ~PiMutex();
   PiMutex(const PiMutex&) = delete;
   PiMutex& operator=(const PiMutex&) = delete;
 
   /// Locks; a wait is traced with the holder and its duration. [rt]
-  void lock() MAUVE_RT;
+  void lock() MAUVE_RT MAUVE_ACQUIRE();
   /// Locks if free. [rt]
-  bool try_lock() MAUVE_RT;
+  bool try_lock() MAUVE_RT MAUVE_TRY_ACQUIRE(true);
   /// Locks, or gives up at the instant; whether it has. Not of one that the caller holds: false. [rt]
-  bool try_lock_until(time_ns_t until_ns) MAUVE_RT;
+  bool try_lock_until(time_ns_t until_ns) MAUVE_RT MAUVE_TRY_ACQUIRE(true);
   /// Unlocks. [rt]
-  void unlock() MAUVE_RT;
+  void unlock() MAUVE_RT MAUVE_RELEASE();
 
   /// The name traced when the lock is contended. [setup]
   void set_trace_id(std::uint32_t id) noexcept { trace_id_ = id; }
@@ -48,16 +48,16 @@ class PiMutex {
   /// The same for others to look at, while the calling thread lives. [rt]
   static const std::atomic<int>& count_of_this_thread() MAUVE_RT;
   /// Unlocks what the calling thread has locked since it held so many. [rt]
-  static void let_go_of_all_but(int held) MAUVE_RT;
+  static void let_go_of_all_but(int held) MAUVE_RT MAUVE_LOCKS_UNSEEN;  // which, its list says
   /// Whether the calling thread has, since the last call, taken a lock twice or let go of one it did not hold. [rt]
   static bool was_misused_by_this_thread() MAUVE_RT;
 
  private:
   bool lock_contended() MAUVE_RT;
   void note_holder() MAUVE_RT;
-  void forget_held() noexcept;
+  void forget_held() noexcept MAUVE_LOCKS_UNSEEN;  // the thread holds it, says its list
 
-  pthread_mutex_t mutex_;
+  InheritingLock mutex_;
   std::atomic<std::int32_t> holder_{0};  // thread id, for the trace only
   std::uint32_t trace_id_{0};
   std::uint32_t depth_{0};   // how often its holder has taken it again

@@ -3,9 +3,9 @@
 #pragma once
 
 #include <atomic>
-#include <mutex>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/this_thread.hpp"
 
 namespace mauve {
@@ -45,7 +45,7 @@ class Previews {
   /// Where the calling thread puts its preview; as it left it, where it has one. [non-rt]
   T& begin() {
     if (T* const own = find()) return *own;
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     for (Place* place = first_.load(std::memory_order_relaxed); place != nullptr; place = place->next) {
       if (place->thread.load(std::memory_order_relaxed) != kNobody) continue;  // both relaxed: under mutex_
       place->thread.store(pthread_self(), std::memory_order_relaxed);
@@ -58,7 +58,7 @@ class Previews {
   }
   /// The calling thread has none any more. [non-rt]
   void end() noexcept {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     for (Place* place = first_.load(std::memory_order_relaxed); place != nullptr; place = place->next) {
       const pthread_t thread = place->thread.load(std::memory_order_relaxed);  // both relaxed: under mutex_
       if (thread == kNobody || !is_this_thread(thread)) continue;
@@ -68,7 +68,7 @@ class Previews {
   }
   /// Whether any thread has one. [non-rt]
   bool is_any() const noexcept {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     for (Place* place = first_.load(std::memory_order_relaxed); place != nullptr; place = place->next) {
       if (place->thread.load(std::memory_order_relaxed) != kNobody)
         return true;  // both relaxed: under mutex_
@@ -84,7 +84,7 @@ class Previews {
     Place* next{nullptr};
   };
 
-  mutable std::mutex mutex_;  // for a moment: no hook, and no thread of a component
+  mutable Mutex mutex_;  // for a moment: no hook, and no thread of a component
   std::atomic<Place*> first_{nullptr};
 };
 

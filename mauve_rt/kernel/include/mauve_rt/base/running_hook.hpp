@@ -4,8 +4,8 @@
 
 #include <functional>
 #include <string>
-#include <thread>
 
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {

@@ -6,12 +6,11 @@
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/clocks.hpp"
 
 namespace mauve {
 
 class Task;
-
-using time_ns_t = std::int64_t;
 
 /// [rt]
 constexpr time_ns_t us_to_ns(std::int64_t us) MAUVE_RT { return us * 1'000; }
@@ -59,11 +58,6 @@ class MonotonicClock final : public Clock {
   /// The process's one instance. [rt]
   static const MonotonicClock& instance() MAUVE_RT;
 };
-
-/// CLOCK_MONOTONIC now. [rt]
-time_ns_t monotonic_now_ns() MAUVE_RT;
-/// CLOCK_REALTIME now. [rt]
-time_ns_t realtime_now_ns() MAUVE_RT;
 
 /// A component's grid: the instants reference + k * period.
 struct Grid {

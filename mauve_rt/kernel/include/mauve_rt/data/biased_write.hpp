@@ -2,10 +2,10 @@
 // BiasedWrite: the service `write` of a resource, for its only port without a lock.
 #pragma once
 
-#include <mutex>
 #include <string>
 
 #include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/service.hpp"
 
@@ -31,7 +31,7 @@ class BiasedWrite final : public WriteService<T> {
   TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
     {
       if (!mutex_.try_lock()) return TryWrite::busy;
-      const std::lock_guard lock(mutex_, std::adopt_lock);
+      const LockGuard lock(mutex_, std::adopt_lock);
       if (!floor_.admits(time_ns) || !owner_.take(value, time_ns)) return TryWrite::done;
     }
     owner_.written(time_ns);

@@ -5,11 +5,11 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 
 #include "mauve_rt/base/function_ref.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
@@ -69,16 +69,16 @@ class ClientBase : public Resource {
 
  private:
   void await(std::uint32_t number, time_ns_t until_ns, Waiter* caller) const noexcept;
-  void count(CallOutcome outcome, time_ns_t lasted_ns) noexcept;
+  void count(CallOutcome outcome, time_ns_t lasted_ns) noexcept MAUVE_REQUIRES(mutex_);
 
   const time_ns_t timeout_ns_;
   mutable PiMutex mutex_;
-  std::uint32_t number_{0};
-  bool is_posted_{false};    // a request that was not taken yet
-  bool is_waiting_{false};   // a call is under way
-  Waiter* caller_{nullptr};  // nullptr: a thread that is no component's
-  CallOutcome outcome_{CallOutcome::answered};
-  CallCounts counts_;
+  std::uint32_t number_ MAUVE_GUARDED_BY(mutex_){0};
+  bool is_posted_ MAUVE_GUARDED_BY(mutex_){false};    // a request that was not taken yet
+  bool is_waiting_ MAUVE_GUARDED_BY(mutex_){false};   // a call is under way
+  Waiter* caller_ MAUVE_GUARDED_BY(mutex_){nullptr};  // nullptr: a thread that is no component's
+  CallOutcome outcome_ MAUVE_GUARDED_BY(mutex_){CallOutcome::answered};
+  CallCounts counts_ MAUVE_GUARDED_BY(mutex_);
   std::atomic<std::uint32_t> ended_{0};  // the number of the last call that ended
   std::atomic<bool> is_connected_{false};
 };

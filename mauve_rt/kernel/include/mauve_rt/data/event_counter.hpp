@@ -3,10 +3,10 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/logged_resource.hpp"
 #include "mauve_rt/data/resource_kind.hpp"
 
@@ -73,8 +73,8 @@ class EventCounter final : public LoggedResource<EventCount, Resource, PiMutex> 
 
   EventMessage said_;
   PiMutex mutex_;
-  EventCount count_;
-  time_ns_t time_ns_{0};
+  EventCount count_ MAUVE_GUARDED_BY(mutex_);
+  time_ns_t time_ns_ MAUVE_GUARDED_BY(mutex_){0};
 
  public:
   Read read{*this};

@@ -4,13 +4,13 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
 #include "mauve_rt/data/latest_register.hpp"
@@ -59,7 +59,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     return mauve::find_number<T>(path);
   }
   bool read_number(const NumberPlace& place, double& number) noexcept override {
-    const std::lock_guard lock(others_mutex_);
+    const LockGuard lock(others_mutex_);
     std::uint32_t held = 0;
     const T* const newest = register_.look(held);
     if (newest != nullptr) number = place.of(newest);
@@ -76,7 +76,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     std::uint32_t max_ports() const noexcept override { return owner_.limits_.readers; }
     DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
       if (reader.seat != nullptr) return owner_.register_.read(value, time_ns, reader);
-      const std::lock_guard lock(owner_.others_mutex_);
+      const LockGuard lock(owner_.others_mutex_);
       const DataStatus status = owner_.register_.read(value, time_ns, reader);
       owner_.register_.let_go(reader.held);
       return status;
@@ -116,7 +116,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
 
   /// A reader whose component was removed while a state of it hung keeps its place until that ends: it is none of the ports.
   void make_room(std::uint32_t ports) {
-    const std::lock_guard lock(room_mutex_);
+    const LockGuard lock(room_mutex_);
     const std::uint32_t seats = seats_.load(std::memory_order_relaxed);
     const std::uint32_t left_behind = seats > read.ports() ? seats - read.ports() : 0;
     register_.reserve(ports + left_behind + kOthers);
@@ -133,7 +133,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   PortLimits limits_;
   LatestRegister<T> register_;
   PiMutex others_mutex_;
-  std::mutex room_mutex_;
+  Mutex room_mutex_;
   std::atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
   std::atomic<std::uint32_t> seats_{0};
 

@@ -5,7 +5,6 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -14,6 +13,7 @@
 #include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/service.hpp"
 
@@ -95,7 +95,7 @@ class EventListeners {
   using Call = void (EventListener::*)(time_ns_t) MAUVE_RT;
   void call_all(Call what, time_ns_t time_ns) MAUVE_RT;
 
-  std::mutex change_mutex_;
+  Mutex change_mutex_;
   PiMutex mutex_;
   std::vector<EventListener*> listeners_;
   std::atomic<std::size_t> count_{0};
@@ -221,8 +221,8 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   Notifier* notifier_{nullptr};
   std::uint64_t handed_out_{0};  // as `seen`, of next_published()
   EventListeners listeners_;
-  mutable std::mutex use_mutex_;
-  std::weak_ptr<const void> use_;
+  mutable Mutex use_mutex_;
+  std::weak_ptr<const void> use_ MAUVE_GUARDED_BY(use_mutex_);
 };
 
 /// A resource that holds one newest value: its serialized face is one look at it.

@@ -4,13 +4,13 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
 #include "mauve_rt/data/logged_resource.hpp"
@@ -74,7 +74,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
     auto value = std::make_unique<T>();
     {
-      const std::lock_guard lock(write.mutex());
+      const LockGuard lock(write.mutex());
       const Place& newest = places_[(writers_.place == 0 ? places_.size() : writers_.place) - 1];
       *value = newest.value;
       time_ns = newest.time_ns;

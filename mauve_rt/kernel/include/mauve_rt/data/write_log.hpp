@@ -6,11 +6,11 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -79,7 +79,7 @@ class WriteLog {
   /// The oldest write that was not taken yet, given to `use`; false: there is none. [non-rt]
   template <typename Use>
   bool next(Use use) {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     if (kept_ == nullptr) return false;
     const std::uint64_t taken = kept_->taken.load(std::memory_order_relaxed);  // relaxed: written here only
     if (taken == kept_->written.load(std::memory_order_acquire)) return false;
@@ -99,17 +99,17 @@ class WriteLog {
 
   template <typename Lock>
   void exchange(std::unique_ptr<Ring> ring, Lock& writers) {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     {
-      const std::lock_guard no_writer(writers);
+      const LockGuard no_writer(writers);
       ring_ = ring.get();
     }
     kept_.swap(ring);  // the old one ends: no writer has it any more
   }
 
   Ring* ring_{nullptr};
-  std::mutex mutex_;
-  std::unique_ptr<Ring> kept_;
+  Mutex mutex_;
+  std::unique_ptr<Ring> kept_ MAUVE_GUARDED_BY(mutex_);
   std::atomic<std::uint64_t> lost_{0};
 };
 

@@ -4,8 +4,9 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 
+#include "mauve_rt/base/barrier.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/run/shadow_thread.hpp"
 
@@ -56,15 +57,13 @@ class Deployer final : public Host {
   bool end_task(Task& task) noexcept override;
 
  private:
-  class Barrier;
-
   void create_threads();
   void shut_down() noexcept;
 
   DeployerOptions options_;
   RealtimeProcess process_;
-  std::mutex life_mutex_;
-  bool has_ended_{false};
+  Mutex life_mutex_;
+  bool has_ended_ MAUVE_GUARDED_BY(life_mutex_){false};
   std::unique_ptr<Barrier> barrier_;  // outlives the threads that met at it
   std::shared_ptr<Watchdog> watchdog_;
   ShadowThreads shadow_threads_;

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,6 +10,7 @@
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/realtime.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/change/prepared_transaction.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
@@ -137,8 +137,8 @@ class Host : public Runner {
   std::shared_ptr<Component> find_leaving(const std::string& name, const Component* present) const;
 
   Architecture& architecture_;
-  mutable std::mutex hosted_mutex_;
-  std::vector<std::weak_ptr<Component>> hosted_;
+  mutable Mutex hosted_mutex_;
+  std::vector<std::weak_ptr<Component>> hosted_ MAUVE_GUARDED_BY(hosted_mutex_);
 };
 
 }  // namespace mauve

@@ -8,8 +8,8 @@
 #include <set>
 #include <vector>
 
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/deploy/due_queue.hpp"
 #include "mauve_rt/deploy/host.hpp"
 

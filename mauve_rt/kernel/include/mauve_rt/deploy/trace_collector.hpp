@@ -2,22 +2,14 @@
 // Empties the rings of an architecture's trace often, for somebody who takes what came less often.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
-
 #include "mauve_rt/architecture/architecture.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve {
 
 /// A thread of its own: SCHED_FIFO 1, after all components, where the system grants that, so that neither a busy
 /// machine nor a disk nor an interpreter keeps it from its work for as long as a ring has room.
-///
-/// | member     | written by            | under                               |
-/// | ---------- | --------------------- | ----------------------------------- |
-/// | collected_ | the thread, take()    | mutex_                              |
-/// | ending_    | the destructor        | mutex_                              |
-/// | the rest   | the constructor       | -                                   |
 class TraceCollector {
  public:
   /// When so many records wait to be taken the rings are left alone, which count what they lose: 64 MiB.
@@ -35,14 +27,14 @@ class TraceCollector {
 
  private:
   void run();
-  void collect();
+  void collect() MAUVE_REQUIRES(mutex_);
 
   Architecture& architecture_;
   time_ns_t period_ns_;
-  std::mutex mutex_;
-  std::condition_variable end_;
-  bool ending_{false};
-  std::vector<TraceRecord> collected_;
+  Mutex mutex_;
+  ConditionVariable end_;
+  bool ending_ MAUVE_GUARDED_BY(mutex_){false};
+  std::vector<TraceRecord> collected_ MAUVE_GUARDED_BY(mutex_);
   Thread thread_;  // last: it uses all others
 };
 

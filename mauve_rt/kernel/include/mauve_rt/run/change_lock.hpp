@@ -2,8 +2,7 @@
 // ChangeLock: under it one thread at a time reads and changes what an architecture consists of.
 #pragma once
 
-#include <condition_variable>
-#include <mutex>
+#include "mauve_rt/base/seam/condition_variable.hpp"
 
 namespace mauve {
 
@@ -13,23 +12,23 @@ namespace mauve {
 /// | member  | written by       | read by | under  |
 /// | ------- | ---------------- | ------- | ------ |
 /// | paused_ | changes          | changes | mutex_ |
-class ChangeLock {
+class MAUVE_LOCK ChangeLock {
  public:
   /// Waits for the thread that holds it. [non-rt]
   /// Throws Error (would_deadlock) from inside a change, by a hook of a part, and as check_caller().
-  void lock();
+  void lock() MAUVE_ACQUIRE();
   /// The same, and waits for the changes that are paused. [non-rt] Throws as lock().
-  void lock_alone();
+  void lock_alone() MAUVE_ACQUIRE();
   /// Only where no thread holds it, and the calling thread is not inside a change; not on a component's own thread. [non-rt]
-  bool try_lock() noexcept;
-  void unlock() noexcept;
+  bool try_lock() noexcept MAUVE_TRY_ACQUIRE(true);
+  void unlock() noexcept MAUVE_RELEASE();
   /// lock(), or lock_alone(), unless the calling thread is inside a change. [non-rt] Throws as check_caller().
-  [[nodiscard]] std::unique_lock<ChangeLock> join();
-  [[nodiscard]] std::unique_lock<ChangeLock> join_alone();
+  [[nodiscard]] std::unique_lock<ChangeLock> join() MAUVE_LOCKS_UNSEEN;
+  [[nodiscard]] std::unique_lock<ChangeLock> join_alone() MAUVE_LOCKS_UNSEEN;
   /// Whether the calling thread holds it: it is inside a change, and not in a Pause. [non-rt]
   bool is_held_here() const noexcept;
   /// Lets others have it until one of them gives it back, at most for 1 ms. [non-rt]
-  void wait_for_others();
+  void wait_for_others() MAUVE_LOCKS_UNSEEN;  // who has the lock has mutex_
   /// Throws Error (would_deadlock) on a component's own thread: a change waits for that one to come to a wait. [non-rt]
   static void check_caller();
 
@@ -61,9 +60,9 @@ class ChangeLock {
   void check_outside() const;
   bool is_inside() const noexcept;
 
-  std::mutex mutex_;
-  std::condition_variable given_back_;
-  int paused_{0};
+  Mutex mutex_;
+  ConditionVariable given_back_;
+  int paused_ MAUVE_GUARDED_BY(mutex_){0};
 };
 
 }  // namespace mauve

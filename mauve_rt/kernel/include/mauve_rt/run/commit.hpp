@@ -254,8 +254,8 @@ class Commit {
  private:
   Participant* find(const Task& task) const MAUVE_RT;
   bool await_slots(time_ns_t until_ns) noexcept;
-  bool lock(time_ns_t until_ns) noexcept;
-  void unlock() noexcept;
+  bool lock(time_ns_t until_ns) noexcept MAUVE_LOCKS_UNSEEN;  // as many as take part
+  void unlock() noexcept MAUVE_LOCKS_UNSEEN;
   bool has_commands() const MAUVE_RT;
   const Task* find_unfit() const noexcept;
   void begin() noexcept;

@@ -20,7 +20,7 @@ class Task;
 /// Locks until the instant, unless the commit that needs the lock is called off: a thread that waits for a lock cannot be woken
 /// for that, so it looks every 20 ms. Whether it has the lock. [rt]
 template <typename IsOff>
-bool lock_unless(PiMutex& mutex, time_ns_t until_ns, IsOff&& is_off) MAUVE_RT {
+bool lock_unless(PiMutex& mutex, time_ns_t until_ns, IsOff&& is_off) MAUVE_RT MAUVE_TRY_ACQUIRE(true, mutex) {
   constexpr time_ns_t kLook = ms_to_ns(20);
   for (;;) {
     const time_ns_t now = monotonic_now_ns();
@@ -68,13 +68,13 @@ class CommitGate {
   PiMutex structural;
 
   /// While it lives the calling thread has the mutex, and the table is what was decided by then. [rt]
-  class Look {
+  class MAUVE_GUARD Look {
    public:
-    explicit Look(CommitGate& gate) MAUVE_RT : gate_(gate) {
+    explicit Look(CommitGate& gate) MAUVE_RT MAUVE_ACQUIRE(gate.mutex_) : gate_(gate) {
       gate_.mutex_.lock();
       gate_.take_in();
     }
-    ~Look() { gate_.mutex_.unlock(); }
+    ~Look() MAUVE_RELEASE() { gate_.mutex_.unlock(); }
     Look(const Look&) = delete;
     Look& operator=(const Look&) = delete;
 
@@ -98,7 +98,7 @@ class CommitGate {
   /// It knows by now who takes part: calls it off where no thread of the architecture may. [rt]
   void look_again(Commit& commit) MAUVE_RT;
   /// Whether an open commit is about the task. [rt], within a Look
-  bool has_open_about(const Task& task) const MAUVE_RT;
+  bool has_open_about(const Task& task) const MAUVE_RT MAUVE_REQUIRES(mutex_);
   /// Calls off the open commits that are about the task; whether there was one. [rt]
   bool abandon(const Task& task) MAUVE_RT;
   /// Calls off the commits under way that give way and are in the urgent one's way, and each such that comes before relax().
@@ -112,14 +112,14 @@ class CommitGate {
   void close() noexcept;
 
  private:
-  void take_in() MAUVE_RT;
-  void call_off_if_unwanted(Commit& commit) MAUVE_RT;
+  void take_in() MAUVE_RT MAUVE_REQUIRES(mutex_);
+  void call_off_if_unwanted(Commit& commit) MAUVE_RT MAUVE_REQUIRES(mutex_);
 
   PiMutex mutex_;
   std::atomic<std::uint32_t> structure_{0};
-  Commit* under_way_{nullptr};     // a list
-  UrgentCommit* urgent_{nullptr};  // a list
-  bool is_open_{false};
+  Commit* under_way_ MAUVE_GUARDED_BY(mutex_){nullptr};     // a list
+  UrgentCommit* urgent_ MAUVE_GUARDED_BY(mutex_){nullptr};  // a list
+  bool is_open_ MAUVE_GUARDED_BY(mutex_){false};
 };
 
 /// What a component has been through. A change claims it while it prepares parts for it: other changes of the component that

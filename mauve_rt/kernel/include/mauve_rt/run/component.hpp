@@ -6,11 +6,11 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/commit_gate.hpp"
@@ -446,16 +446,16 @@ class Component final : public Configurable {
   std::atomic<bool> is_renewing_{false};
   std::weak_ptr<Component> self_;
 
-  mutable std::mutex shown_mutex_;
-  ShownParts shown_;
+  mutable Mutex shown_mutex_;
+  ShownParts shown_ MAUVE_GUARDED_BY(shown_mutex_);
   std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
-  std::shared_ptr<const StateTimes> shown_times_;
-  std::vector<DescribedState> shown_states_;
-  std::shared_ptr<Probation> probation_;
+  std::shared_ptr<const StateTimes> shown_times_ MAUVE_GUARDED_BY(shown_mutex_);
+  std::vector<DescribedState> shown_states_ MAUVE_GUARDED_BY(shown_mutex_);
+  std::shared_ptr<Probation> probation_ MAUVE_GUARDED_BY(shown_mutex_);
   std::atomic<Probation*> next_probation_{
       nullptr};  // of a change that is not settled; cleared under shown_mutex_
-  std::optional<ProbationRecord> last_probation_;
-  std::shared_ptr<Shadow> shadow_;
+  std::optional<ProbationRecord> last_probation_ MAUVE_GUARDED_BY(shown_mutex_);
+  std::shared_ptr<Shadow> shadow_ MAUVE_GUARDED_BY(shown_mutex_);
 };
 
 /// What a commit cost one of its participants; waits for its next release as long as told. [non-rt]

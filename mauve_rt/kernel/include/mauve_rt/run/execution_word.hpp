@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "mauve_rt/base/contract.hpp"
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {

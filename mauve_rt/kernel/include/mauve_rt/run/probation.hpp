@@ -6,12 +6,12 @@
 #include <cstdint>
 #include <limits>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/output_watch.hpp"
@@ -251,9 +251,9 @@ class Probation : public std::enable_shared_from_this<Probation> {
   std::atomic<std::int64_t> releases_{0};
   std::atomic<bool> is_requested_{false};
   std::atomic<bool> is_comeback_claimed_{false};
-  mutable std::mutex request_mutex_;
-  std::string request_{};
-  std::string left_out_{};  // why the old core does not go on
+  mutable Mutex request_mutex_;
+  std::string request_ MAUVE_GUARDED_BY(request_mutex_){};
+  std::string left_out_ MAUVE_GUARDED_BY(request_mutex_){};  // why the old core does not go on
   time_ns_t hung_for_ns_{0};
 };
 

@@ -5,12 +5,12 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/parts/core.hpp"
 #include "mauve_rt/parts/fsm.hpp"
@@ -174,15 +174,15 @@ class Shadow {
 
   void connect_cells();
   void bind();
-  void execute(const ShadowCapture::Release& release);
+  void execute(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
   void take_properties();
   void put_inputs();
-  bool advance_to(const ShadowCapture::Release& release);
-  void compare(const ShadowCapture::Release& release);
-  void count_execution(time_ns_t execution_ns);
+  bool advance_to(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
+  void compare(const ShadowCapture::Release& release) MAUVE_REQUIRES(figures_mutex_);
+  void count_execution(time_ns_t execution_ns) MAUVE_REQUIRES(run_mutex_, figures_mutex_);
   void fault(const std::string& what, time_ns_t instant_ns);
   void clean_up() noexcept;
-  std::string reason() const;
+  std::string reason() const MAUVE_REQUIRES(figures_mutex_);
 
   const std::string component_;
   const std::string live_core_;
@@ -199,21 +199,23 @@ class Shadow {
   time_ns_t ended_ns_{0};
   ShadowCause cause_{ShadowCause::none};
 
-  std::mutex run_mutex_;
+  Mutex run_mutex_;
   std::vector<std::unique_ptr<PortCell>> cells_;  // by the port's place in the shell; outlive the parts
   ShadowParts parts_;
   std::unique_ptr<StillClock> clock_;
   Machine machine_{settings_};
   CoreBinding binding_{};
   bool is_retired_{false};
-  std::int64_t debt_{0};  // releases to be skipped
-  bool is_anew_{false};   // as of a release that was skipped
+  std::int64_t debt_ MAUVE_GUARDED_BY(run_mutex_){0};  // releases to be skipped
+  bool is_anew_ MAUVE_GUARDED_BY(run_mutex_){false};   // as of a release that was skipped
 
-  mutable std::mutex figures_mutex_;
-  Figures figures_{};
-  std::string fault_{};
-  std::vector<std::pair<std::string, PropertyValue>> properties_{};    // to be set
-  std::vector<std::pair<std::size_t, OutputComparison>> comparisons_;  // by the port's place in the shell
+  mutable Mutex figures_mutex_;
+  Figures figures_ MAUVE_GUARDED_BY(figures_mutex_){};
+  std::string fault_ MAUVE_GUARDED_BY(figures_mutex_){};
+  std::vector<std::pair<std::string, PropertyValue>> properties_
+      MAUVE_GUARDED_BY(figures_mutex_){};  // to be set
+  std::vector<std::pair<std::size_t, OutputComparison>> comparisons_
+      MAUVE_GUARDED_BY(figures_mutex_);  // by the port's place in the shell
 };
 
 }  // namespace mauve

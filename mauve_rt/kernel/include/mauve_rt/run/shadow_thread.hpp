@@ -7,9 +7,9 @@
 #include <memory>
 #include <vector>
 
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve {
 

@@ -6,17 +6,18 @@
 
 #include <atomic>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
+#include "mauve_rt/base/barrier.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
-#include "mauve_rt/base/threads.hpp"
 #include "mauve_rt/base/waiter.hpp"
 #include "mauve_rt/run/commit.hpp"
 #include "mauve_rt/run/machine.hpp"
@@ -173,7 +174,7 @@ class Task final : public Waiter {
   /// Creates the thread, prefaults its stack and reads back its rights; it meets the barrier (if any), then parks.
   /// [setup] Without the right to SCHED_FIFO it falls back to SCHED_OTHER, or throws Error (realtime_denied)
   /// when told so; and Error (timeout) while an earlier thread of the task has not ended.
-  void create_thread(pthread_barrier_t* barrier, bool require_realtime, bool trace,
+  void create_thread(Barrier* barrier, bool require_realtime, bool trace,
                      std::shared_ptr<Watchdog> watchdog = {});
   /// Tells the thread to end, then joins it; false when it was still in user code at the instant, or when a commit held
   /// the task until then, in the adopt of a parked component's new core. An abandoned one is not waited for. [non-rt]
@@ -433,7 +434,7 @@ class Task final : public Waiter {
   TaskSettings settings_;
   Machine machine_{settings_};
   ThreadCounters counters_;
-  std::mutex ring_mutex_;
+  Mutex ring_mutex_;
   std::unique_ptr<TraceRing> ring_;
 
   std::atomic<Shell*> shell_{nullptr};
@@ -442,12 +443,12 @@ class Task final : public Waiter {
   PiMutex command_mutex_;
   PiMutex order_mutex_;
   Thread thread_;
-  pthread_barrier_t* barrier_{nullptr};
+  Barrier* barrier_{nullptr};
   std::atomic<bool> has_thread_{false};
   bool simulated_{false};
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
-  FaultNote fault_;
+  FaultNote fault_ MAUVE_GUARDED_BY(fault_mutex_);
   FaultNote time_out_note_;  // of an execution that timed out, then the fault before it; empty while none has
   std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
   const std::atomic<int>* locks_held_{nullptr};

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <vector>
 
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -71,7 +71,7 @@ class Watchdog {
   Thread writer_;
   bool runs_{false};
   PiMutex tasks_mutex_;
-  std::vector<Task*> tasks_;
+  std::vector<Task*> tasks_ MAUVE_GUARDED_BY(tasks_mutex_);
   std::atomic<time_ns_t> wake_before_ns_{kForever};
   std::atomic<std::uint32_t> alarm_{0};
   std::atomic<std::uint32_t> left_{0};

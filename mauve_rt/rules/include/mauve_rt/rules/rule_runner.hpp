@@ -4,16 +4,15 @@
 
 #include <array>
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <map>
 #include <memory>
-#include <mutex>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/rules/action.hpp"
 #include "mauve_rt/rules/engine.hpp"
@@ -145,7 +144,7 @@ class RuleRunner {
   void hear_ends(time_ns_t now_ns) MAUVE_RT;
   void ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) MAUVE_RT;
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
-  void show_status() MAUVE_RT;
+  void show_status() MAUVE_RT MAUVE_LOCKS_UNSEEN;  // where its mutex is free
   bool is_unsettled(std::size_t index) const MAUVE_RT;
   bool commit(std::size_t index) noexcept;
   bool reserve(std::size_t index) noexcept;
@@ -176,12 +175,12 @@ class RuleRunner {
   std::uint64_t followed_{0};  // the follower's: the revision at which preparation threads were asked
   bool runs_{false};
   mutable PiMutex status_mutex_;
-  mutable std::mutex told_mutex_;
-  std::condition_variable told_changed_;
-  std::deque<Told> told_;
-  std::uint64_t left_out_{0};
-  std::string unobservable_{};  // why something cannot be heard
-  bool woken_{false};
+  mutable Mutex told_mutex_;
+  ConditionVariable told_changed_;
+  std::deque<Told> told_ MAUVE_GUARDED_BY(told_mutex_);
+  std::uint64_t left_out_ MAUVE_GUARDED_BY(told_mutex_){0};
+  std::string unobservable_ MAUVE_GUARDED_BY(told_mutex_){};  // why something cannot be heard
+  bool woken_ MAUVE_GUARDED_BY(told_mutex_){false};
   std::uint16_t trace_number_;
 };
 

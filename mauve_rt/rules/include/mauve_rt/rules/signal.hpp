@@ -9,8 +9,8 @@
 #include <string>
 
 #include "mauve_rt/base/contract.hpp"
-#include "mauve_rt/base/futex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve::rules {

@@ -7,7 +7,7 @@
 #include <functional>
 
 #include "mauve_rt/base/rt.hpp"
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve::rules {
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/base/futex.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
 
 #include <linux/futex.h>
 #include <sys/syscall.h>
@@ -16,6 +16,7 @@ namespace {
 
 static_assert(sizeof(std::atomic<std::uint32_t>) == sizeof(std::uint32_t),
               "the futex word is the atomic itself");
+static_assert(kFutexHolder == FUTEX_TID_MASK);
 
 /// Returns 0, or the error's number.
 int futex(const std::atomic<std::uint32_t>& word, int operation, std::uint32_t value, const timespec* until)
@@ -44,6 +45,14 @@ bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expe
 
 void futex_wake_all(const std::atomic<std::uint32_t>& word) noexcept {
   futex(word, FUTEX_WAKE_BITSET_PRIVATE, static_cast<std::uint32_t>(INT_MAX), nullptr);
+}
+
+bool futex_lock_pi(std::atomic<std::uint32_t>& word) noexcept {
+  return futex(word, FUTEX_LOCK_PI_PRIVATE, 0, nullptr) == 0;
+}
+
+bool futex_unlock_pi(std::atomic<std::uint32_t>& word) noexcept {
+  return futex(word, FUTEX_UNLOCK_PI_PRIVATE, 0, nullptr) == 0;
 }
 
 }  // namespace mauve

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 #include <sched.h>
 
@@ -39,6 +39,13 @@ class Attributes {
 };
 
 }  // namespace
+
+int await_signal(const sigset_t& signals) noexcept {
+  int signal = 0;
+  while (sigwait(&signals, &signal) != 0) {
+  }
+  return signal;
+}
 
 int Thread::start(const ThreadSettings& settings, void* (*entry)(void*), void* argument) {
   Attributes attributes(settings);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-#include "mauve_rt/base/process_barrier.hpp"
+#include "mauve_rt/base/seam/process_barrier.hpp"
 
 #include <linux/membarrier.h>
 #include <sys/syscall.h>

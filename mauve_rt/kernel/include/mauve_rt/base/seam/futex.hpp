@@ -17,4 +17,11 @@ bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expe
 /// Wakes every thread that sleeps on the word. [rt]
 void futex_wake_all(const std::atomic<std::uint32_t>& word) MAUVE_RT;
 
+/// A futex with priority inheritance: its word holds the id of the holder (kFutexHolder), as this_thread_id(), or 0.
+inline constexpr std::uint32_t kFutexHolder = 0x3fff'ffff;
+/// Locks it. [rt] Bounded by the section of the holder. False where no thread of the process has the id of the holder.
+bool futex_lock_pi(std::atomic<std::uint32_t>& word) MAUVE_RT;
+/// By the holder, where the word could not be set from its id to 0. [rt]
+bool futex_unlock_pi(std::atomic<std::uint32_t>& word) MAUVE_RT;
+
 }  // namespace mauve

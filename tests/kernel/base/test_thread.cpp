@@ -3,11 +3,11 @@
 #include <csignal>
 #include <cstring>
 
-#include "mauve_rt/base/threads.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
 #include "fixtures.hpp"
 
-namespace mauve::testing::test_threads {
+namespace mauve::testing::test_thread {
 
 struct Seen {
   char name[16]{};
@@ -66,4 +66,4 @@ TEST(Threads, ThatMustBeRealTimeAreRefusedWhereTheyCannotBe) {
   EXPECT_EQ(EPERM, thread.start({.name = "c", .priority = 7, .require_realtime = true}, look, &seen));
 }
 
-}  // namespace mauve::testing::test_threads
+}  // namespace mauve::testing::test_thread

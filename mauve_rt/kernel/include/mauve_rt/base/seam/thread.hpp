@@ -36,6 +36,9 @@ class SignalsBlocked {
   sigset_t before_;
 };
 
+/// Waits for one of the signals, which the threads of the process block; which one came. [non-rt]
+int await_signal(const sigset_t& signals) noexcept;
+
 struct ThreadSettings {
   std::string name;              // 15 characters of it
   int priority{0};               // SCHED_FIFO; 0: an ordinary thread

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/base/seam/clocks.hpp"
+
+#include <ctime>
+
+namespace mauve {
+
+namespace {
+
+time_ns_t read_clock(clockid_t clock) MAUVE_RT {
+  timespec now{};
+  MAUVE_RT_TRUSTED(clock_gettime(clock, &now));  // reads a page of the system's, and makes no call of it
+  return time_ns_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+}
+
+}  // namespace
+
+time_ns_t monotonic_now_ns() noexcept { return read_clock(CLOCK_MONOTONIC); }
+time_ns_t realtime_now_ns() noexcept { return read_clock(CLOCK_REALTIME); }
+time_ns_t thread_cpu_now_ns() noexcept { return read_clock(CLOCK_THREAD_CPUTIME_ID); }
+
+}  // namespace mauve
