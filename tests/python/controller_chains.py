@@ -79,10 +79,11 @@ def of(log: list[Execution], *cores: str) -> list[Execution]:
 def check_that_no_release_is_lost(running: Running, executions: list[Execution], name: str) -> None:
     """Each instant of a component's grid was executed, or skipped for an overrun that was counted.
 
-    Stops the components, so that nothing is executed between the looks.
+    Stops the components, so that nothing is executed between the looks. The last skipped instants may have no
+    execution after them.
     """
     running.host.shutdown()
     first, last = executions[0].clock_ns, executions[-1].clock_ns
     skipped = running.architecture.component(name).describe().skipped
-    assert (last - first) // PERIOD_NS + 1 == len(executions) + skipped
+    assert 0 <= (last - first) // PERIOD_NS + 1 - len(executions) <= skipped
     assert not (running.simulated and skipped)
