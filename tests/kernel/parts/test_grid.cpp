@@ -91,7 +91,7 @@ TEST_F(Rule4Overrun, CatchUpOwingTooMuchIsAFault) {
   EXPECT_THAT(component.task().fault().what, ::testing::HasSubstr("max_backlog"));
 }
 
-TEST_F(Rule4Overrun, FaultFaults) {
+TEST_F(Rule4Overrun, FaultFaultsOnThreads) {
   Component& component = overrun_once(OverrunPolicy::fault);
   wait_until([&] { return component.task().state() == ComponentState::faulted; }, "the fault");
   EXPECT_EQ("Pause", component.task().fault().where);
