@@ -109,7 +109,7 @@ TransactionReport commit(PyHost& self, const PyTransaction& steps, bool dry_run,
   return committed->report(dry_run ? 0 : phase_timeout_ns);
 }
 
-/// With Python's 5 ms a component in Python would wait that long for a thread that computes; DESIGN section 4.
+/// A component in Python waits up to one interval for a thread that computes. Python's default is 5 ms.
 void shorten_switch_interval() {
   constexpr double kSwitchIntervalS = 1e-4;
   const py::module_ sys = py::module_::import("sys");
