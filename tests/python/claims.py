@@ -19,8 +19,8 @@ PAGES_OF_CLAIMS = (
     *(
         f"docs/concepts/{name}.md"
         for name in (
-            *("basic_elements", "components", "deployment", "failures_of_peers", "faults", "performance"),
-            *("replacing", "resources", "rules_overview", "source_tree", "traces"),
+            *("basic_elements", "components", "deployment", "failures_of_peers", "faults", "kernel_rules"),
+            *("performance", "replacing", "resources", "rules_overview", "source_tree", "traces"),
         )
     ),
     *(
