@@ -121,7 +121,7 @@ TYPED_TEST(SporadicChanges, AnotherShellLosesNoEventEither) {
   this->write();
   Transaction change;
   change.replace_shell("c", std::make_unique<TestShell>());
-  this->host.commit(std::move(change));
+  this->host.commit(std::move(change), 0);
   this->wait_runs(component, 2);
   this->write();
   this->wait_runs(component, 3);
@@ -233,7 +233,7 @@ TYPED_TEST(SporadicChanges, MoreThanEightListenToOneResourceAndEachIsReplaced) {
   Transaction change;
   for (const std::string& name : names)
     change.replace_fsm(name, std::make_unique<FreeFsm>(waits_first(us_to_ns(1))));
-  this->host.commit(std::move(change));
+  this->host.commit(std::move(change), 0);
   this->write();
   for (const std::string& name : names) this->wait_runs(this->architecture.component(name), 1);
 }
