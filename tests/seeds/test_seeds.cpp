@@ -8,7 +8,7 @@
 #include "mauve_rt/base/seam/sleep.hpp"
 
 #include "forked_run.hpp"
-#include "transaction_fixtures.hpp"
+#include "random_architecture.hpp"
 
 namespace mauve::testing::test_seeds {
 
@@ -70,5 +70,8 @@ void run_twice(const Scenario& scenario) {
 
 TEST(SeedsOfADeployment, GiveTheSameRunTwice) { run_twice(deploy_two); }
 TEST(SeedsOfADeployment, EndEachRun) { run_seeds(deploy_two, 200); }
+
+TEST(SeedsOfARandomArchitecture, GiveTheSameRunTwice) { run_twice(random_architecture); }
+TEST(SeedsOfARandomArchitecture, KeepTheRules) { run_seeds(random_architecture, 300); }
 
 }  // namespace mauve::testing::test_seeds

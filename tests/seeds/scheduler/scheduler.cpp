@@ -353,7 +353,9 @@ void step(Call call) noexcept {
   thread.cpu_ns += cost_ns;
   if (s.random.once_in(s.weather.stall_once_in)) {
     note(thread, Call::stall);
-    s.now_ns += s.random.up_to(s.weather.stall_ns);
+    const time_ns_t stall_ns = s.random.up_to(s.weather.stall_ns);
+    s.now_ns += stall_ns;
+    s.outcome.stalled_ns += stall_ns;
   }
   if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
   if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
