@@ -3,7 +3,9 @@
 // MAUVE_SEEDS asks for so many seeds, MAUVE_SEED for the first of them, MAUVE_SEED_TRACE for a file with the calls of that one.
 #include <gtest/gtest.h>
 
+#include <cstdio>
 #include <cstdlib>
+#include <map>
 
 #include "mauve_rt/base/seam/sleep.hpp"
 
@@ -44,15 +46,18 @@ template <typename Scenario>
 void run_seeds(const Scenario& scenario, std::uint64_t count) {
   const std::uint64_t first = asked("MAUVE_SEED", 1);
   count = asked("MAUVE_SEEDS", count);
+  std::map<std::string, std::int64_t> counts;
   for (std::uint64_t seed = first; seed < first + count; ++seed) {
     const Run run = run_forked(scenario, seed);
+    for (const auto& [what, times] : run.counts) counts[what] += times;
     EXPECT_TRUE(run.is_good()) << "seed " << seed << ", status " << run.status << "\n" << run.text;
   }
+  for (const auto& [what, times] : counts)
+    std::printf("%12lld %s\n", static_cast<long long>(times), what.c_str());
 }
 
 template <typename Scenario>
-void run_twice(const Scenario& scenario) {
-  const std::uint64_t seed = asked("MAUVE_SEED", 1);
+void run_twice(const Scenario& scenario, std::uint64_t seed) {
   const char* trace = std::getenv("MAUVE_SEED_TRACE");  // NOLINT(concurrency-mt-unsafe): nobody sets any
   const std::string file = trace != nullptr ? trace : "";
   const Run one = run_forked(scenario, seed, file);
@@ -61,11 +66,13 @@ void run_twice(const Scenario& scenario) {
   EXPECT_GT(one.outcome.calls, 0U);
   EXPECT_EQ(one.outcome, other.outcome) << "seed " << seed << " does not give the same run twice";
   EXPECT_EQ(one.text, other.text);
-  std::printf("seed %llu: hash %016llx, %llu calls, %llu switches, %.3f s\n",
-              static_cast<unsigned long long>(seed), static_cast<unsigned long long>(one.outcome.hash),
-              static_cast<unsigned long long>(one.outcome.calls),
-              static_cast<unsigned long long>(one.outcome.switches),
-              static_cast<double>(one.outcome.passed_ns) / 1e9);
+}
+
+template <typename Scenario>
+void run_twice(const Scenario& scenario) {
+  const std::uint64_t first = asked("MAUVE_SEED", 1);
+  const std::uint64_t end = first + asked("MAUVE_SEEDS", 20);
+  for (std::uint64_t seed = first; seed < end; ++seed) run_twice(scenario, seed);
 }
 
 TEST(SeedsOfADeployment, GiveTheSameRunTwice) { run_twice(deploy_two); }
