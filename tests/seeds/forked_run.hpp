@@ -72,7 +72,7 @@ Run run_forked(const Scenario& scenario, std::uint64_t seed, const std::string& 
     CPU_ZERO(&here);
     CPU_SET(static_cast<std::size_t>(sched_getcpu()), &here);
     sched_setaffinity(0, sizeof(here), &here);
-    Options options{.seed = seed, .keeps_trace = !trace.empty()};
+    Options options{.seed = seed, .longest_ns = 60'000'000'000, .keeps_trace = !trace.empty()};
     const char* until_ms =
         std::getenv("MAUVE_SEED_UNTIL_MS");  // NOLINT(concurrency-mt-unsafe): nobody sets any
     if (until_ms != nullptr) options.longest_ns = std::stoll(until_ms) * 1'000'000;

@@ -106,7 +106,11 @@ class SeedCore : public TestCore {
 class RandomArchitecture {
  public:
   RandomArchitecture(std::uint64_t seed, seeds::Findings& findings)
-      : dice_(seed), findings_(findings), seed_(seed), shuts_down_(dice_.once_in(3)) {}
+      : dice_(seed),
+        findings_(findings),
+        seed_(seed),
+        shuts_down_(dice_.once_in(3)),
+        two_change_(dice_.once_in(2)) {}
 
   void run() {
     {
@@ -155,6 +159,12 @@ class RandomArchitecture {
     int core;
   };
 
+  /// Which client changes a component: the only one, or each of two every other.
+  enum class Owner : std::uint8_t { only, first, second };
+  static bool owns(Owner owner, std::size_t component) {
+    return owner == Owner::only || component % 2 == (owner == Owner::first ? 0U : 1U);
+  }
+
   static constexpr time_ns_t kSlack = ms_to_ns(150);
   static constexpr time_ns_t kShutdown = Deployer::kStopTimeout + ms_to_ns(500) + kSlack;
 
@@ -192,14 +202,14 @@ class RandomArchitecture {
     return std::make_unique<SeedCore>(shared_, component, number, manner,
                                       seed_ * 1000 + static_cast<std::uint64_t>(number));
   }
-  Manner any_manner() {
-    if (dice_.once_in(2)) return Manner::good;
-    return static_cast<Manner>(dice_.below(static_cast<int>(kMannerNames.size())));
+  static Manner any_manner(Dice& dice) {
+    if (dice.once_in(2)) return Manner::good;
+    return static_cast<Manner>(dice.below(static_cast<int>(kMannerNames.size())));
   }
   int any(Dice& dice) const { return dice.below(static_cast<int>(parts_.size())); }
 
   void request() {
-    if (!dice_.once_in(4)) return change();
+    if (!dice_.once_in(4)) return change(dice_, two_change_ ? Owner::first : Owner::only);
     command(dice_);
   }
 
@@ -234,16 +244,21 @@ class RandomArchitecture {
     Dice dice(seed_ + 77);
     for (int commands = dice.below(25); commands > 0; --commands) {
       sleep_for(dice.between(0, ms_to_ns(20)));
-      command(dice);
+      if (two_change_ && dice.once_in(2)) {
+        change(dice, Owner::second);
+      } else {
+        command(dice);
+      }
     }
     if (shuts_down_) timed("shutdown of the second client", kShutdown, [&] { deployer_->shutdown(); });
   }
 
   /// By the description each component has its gain. One that is late to a change that was made, or was given up there, may show
   /// the old one.
-  void expect_gains(const std::string& after_what) {
+  void expect_gains(const std::string& after_what, Owner owner) {
     for (const ComponentFacts& facts : architecture_->describe().components) {
       const auto part = std::ranges::find(parts_, facts.name, &Part::name);
+      if (!owns(owner, static_cast<std::size_t>(part - parts_.begin()))) continue;
       const auto component = architecture_->find_component(facts.name);
       if (architecture_->find_awaited(facts.name) != nullptr || component->task().is_left_behind()) continue;
       for (const ShownProperty& property : facts.parts.properties) {
@@ -255,40 +270,41 @@ class RandomArchitecture {
     }
   }
 
-  void change() {
+  void change(Dice& dice, Owner owner) {
     Transaction transaction;
     std::vector<Part> after = parts_;
     std::string text = "change:";
     next_gain_ = next_gain_ > 9.0 ? 0.125 : next_gain_ + 0.125;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (dice_.once_in(2)) continue;
+      if (!owns(owner, i) || dice.once_in(2)) continue;
       const std::string& name = parts_[i].name;
-      if (dice_.once_in(2)) {
+      if (dice.once_in(2)) {
         transaction.set_property(name, "gain", after[i].gain = next_gain_);
         text += " gain " + name;
       }
-      if (dice_.once_in(2)) {
-        const Manner manner = any_manner();
+      if (dice.once_in(2)) {
+        const Manner manner = any_manner(dice);
         after[i].core = next_core_;
         transaction.replace_core(name, core(static_cast<int>(i), manner));
         text += std::string(" core ") + kMannerNames[static_cast<std::size_t>(manner)] + " " + name;
       }
-      if (dice_.once_in(12)) transaction.stop(name);
-      if (dice_.once_in(6)) transaction.start(name);
+      if (dice.once_in(12)) transaction.stop(name);
+      if (dice.once_in(6)) transaction.start(name);
     }
     if (transaction.steps().empty()) return;
     constexpr std::array kPatience{ms_to_ns(5), ms_to_ns(40), s_to_ns(1)};
     const TransactionOptions options{
-        .timeouts = {.commit_ns = kPatience[static_cast<std::size_t>(dice_.below(3))],
-                     .phase_ns = dice_.once_in(2) ? 0 : ms_to_ns(30)},
-        .force = dice_.once_in(6)};
+        .timeouts = {.commit_ns = kPatience[static_cast<std::size_t>(dice.below(3))],
+                     .phase_ns = dice.once_in(2) ? 0 : ms_to_ns(30)},
+        .force = dice.once_in(6)};
     const std::uint64_t revision = architecture_->revision();
     const time_ns_t began_ns = seeds::now_ns();
     std::optional<TransactionReport> report;
     std::string refusal;
     time_ns_t longest_ns = 2 * options.timeouts.commit_ns + options.timeouts.phase_ns + kSlack;
     // A change that a shutdown overtakes waits for the thread of each of its components, one after the other.
-    if (shuts_down_) longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(500);
+    if (two_change_) longest_ns *= 2;  // it waits for the other one's
+    if (shuts_down_ || owner == Owner::second) longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(500);
     timed(text, longest_ns, [&] {
       try {
         report = deployer_->commit(std::move(transaction), options);
@@ -297,20 +313,21 @@ class RandomArchitecture {
         expect(error.code() != ErrorCode::internal, "internal error: " + refusal);
       }
     });
-    if (report) note_made(*report, after, began_ns);
+    if (report) note_made(*report, after, began_ns, owner);
     findings_.count(report ? "changes made" : "changes refused");
     // Commands and faults count, too.
     const std::uint64_t least = revision + (report ? 1 : 0);
     expect(architecture_->revision() >= least, text + ": revision " +
                                                    std::to_string(architecture_->revision()) +
                                                    ", expected at least " + std::to_string(least));
-    expect_gains(text + (report ? ": made" : ": refused: " + refusal));
+    expect_gains(text + (report ? ": made" : ": refused: " + refusal), owner);
   }
 
-  void note_made(const TransactionReport& report, const std::vector<Part>& after, time_ns_t began_ns) {
+  void note_made(const TransactionReport& report, const std::vector<Part>& after, time_ns_t began_ns,
+                 Owner owner) {
     const time_ns_t ended_ns = seeds::now_ns();
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (after[i].gain == parts_[i].gain && after[i].core == parts_[i].core) continue;
+      if (!owns(owner, i) || (after[i].gain == parts_[i].gain && after[i].core == parts_[i].core)) continue;
       time_ns_t instant_ns = kNotMeasured;
       for (const StepReport& step : report.steps) {
         if (step.component == parts_[i].name && step.instant_ns != kNotMeasured) instant_ns = step.instant_ns;
@@ -323,8 +340,8 @@ class RandomArchitecture {
                        .ended_ns = ended_ns,
                        .gain = after[i].gain,
                        .core = after[i].core});
+      parts_[i] = after[i];
     }
-    parts_ = after;
   }
 
   /// Whether an execution comes after a change: yes, no, or either where the change has no instant.
@@ -368,6 +385,7 @@ class RandomArchitecture {
   seeds::Findings& findings_;
   std::uint64_t seed_;
   bool shuts_down_;  // the second client, at any moment
+  bool two_change_;  // the second client, too
   std::shared_ptr<Shared> shared_{std::make_shared<Shared>()};
   Architecture* architecture_{nullptr};
   Deployer* deployer_{nullptr};
