@@ -157,6 +157,8 @@ class RandomArchitecture {
     time_ns_t began_ns, ended_ns;
     double gain;
     int core;
+    int removed{
+        kAbsent};  // the core that a removal is about: T may be before executions of an earlier component of that name
   };
 
   /// Which client changes a component: the only one, or each of two every other.
@@ -165,6 +167,8 @@ class RandomArchitecture {
     return owner == Owner::only || component % 2 == (owner == Owner::first ? 0U : 1U);
   }
 
+  static constexpr int kExtra = -1, kAbsent = -1;  // a component, a core
+  static constexpr time_ns_t kExtraPeriod = ms_to_ns(3);
   static constexpr time_ns_t kSlack = ms_to_ns(150);
   static constexpr time_ns_t kShutdown = Deployer::kStopTimeout + ms_to_ns(500) + kSlack;
 
@@ -258,6 +262,7 @@ class RandomArchitecture {
   void expect_gains(const std::string& after_what, Owner owner) {
     for (const ComponentFacts& facts : architecture_->describe().components) {
       const auto part = std::ranges::find(parts_, facts.name, &Part::name);
+      if (part == parts_.end()) continue;
       if (!owns(owner, static_cast<std::size_t>(part - parts_.begin()))) continue;
       const auto component = architecture_->find_component(facts.name);
       if (architecture_->find_awaited(facts.name) != nullptr || component->task().is_left_behind()) continue;
@@ -288,8 +293,19 @@ class RandomArchitecture {
         transaction.replace_core(name, core(static_cast<int>(i), manner));
         text += std::string(" core ") + kMannerNames[static_cast<std::size_t>(manner)] + " " + name;
       }
+      if (dice.once_in(6)) {
+        transaction.replace_fsm(name, std::make_unique<TestFsm>());  // keeps its place
+        text += " fsm " + name;
+      }
       if (dice.once_in(12)) transaction.stop(name);
       if (dice.once_in(6)) transaction.start(name);
+    }
+    const bool changes_extra = owner != Owner::second && dice.once_in(3);
+    int extra = extra_;
+    if (changes_extra) {
+      extra = extra_ == kAbsent ? next_core_ : kAbsent;
+      text += extra_ == kAbsent ? " add extra" : " remove extra";
+      enter_extra(transaction, dice);
     }
     if (transaction.steps().empty()) return;
     constexpr std::array kPatience{ms_to_ns(5), ms_to_ns(40), s_to_ns(1)};
@@ -304,7 +320,8 @@ class RandomArchitecture {
     time_ns_t longest_ns = 2 * options.timeouts.commit_ns + options.timeouts.phase_ns + kSlack;
     // A change that a shutdown overtakes waits for the thread of each of its components, one after the other.
     if (two_change_) longest_ns *= 2;  // it waits for the other one's
-    if (shuts_down_ || owner == Owner::second) longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(500);
+    if (shuts_down_ || owner == Owner::second)
+      longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(500);
     timed(text, longest_ns, [&] {
       try {
         report = deployer_->commit(std::move(transaction), options);
@@ -314,7 +331,27 @@ class RandomArchitecture {
       }
     });
     if (report) note_made(*report, after, began_ns, owner);
+    if (report && changes_extra) {
+      const int removed = std::exchange(extra_, extra);
+      made_.push_back({.component = kExtra,
+                       .instant_ns = instant_of(*report, "extra"),
+                       .began_ns = began_ns,
+                       .ended_ns = seeds::now_ns(),
+                       .gain = 1.0,
+                       .core = extra,
+                       .removed = removed});
+      findings_.count(extra == kAbsent ? "components removed" : "components added");
+    }
+    if (owner != Owner::second) {
+      const bool is_listed = architecture_->find_component("extra") != nullptr;
+      expect(is_listed == (extra_ != kAbsent), text + (report ? ": made" : ": refused: " + refusal) +
+                                                   ": the list " + (is_listed ? "has" : "has not") +
+                                                   " the extra component");
+    }
     findings_.count(report ? "changes made" : "changes refused");
+    findings_.note(
+        (report ? "made, T " + std::to_string(report->instant_ns) : "refused: " + refusal) +
+        (changes_extra && report ? ", of extra " + std::to_string(instant_of(*report, "extra")) : ""));
     // Commands and faults count, too.
     const std::uint64_t least = revision + (report ? 1 : 0);
     expect(architecture_->revision() >= least, text + ": revision " +
@@ -323,15 +360,36 @@ class RandomArchitecture {
     expect_gains(text + (report ? ": made" : ": refused: " + refusal), owner);
   }
 
+  /// Adds the extra component, or removes it.
+  void enter_extra(Transaction& transaction, Dice& dice) {
+    if (extra_ != kAbsent) {
+      transaction.remove_component("extra");
+      return;
+    }
+    ComponentParts rest{.settings = {.priority = 10 + 10 * dice.below(4)}};
+    rest.properties["period_ms"] = std::int64_t{kExtraPeriod / ms_to_ns(1)};
+    transaction.add_component("extra",
+                              Parts{.shell = new_part<Shell, TestShell>(),
+                                    .core = core(kExtra, Manner::good),
+                                    .fsm = new_part<FsmBase, TestFsm>()},
+                              rest);
+    transaction.start("extra");
+  }
+
+  static time_ns_t instant_of(const TransactionReport& report, const std::string& component) {
+    time_ns_t instant_ns = kNotMeasured;
+    for (const StepReport& step : report.steps) {
+      if (step.component == component && step.instant_ns != kNotMeasured) instant_ns = step.instant_ns;
+    }
+    return instant_ns;
+  }
+
   void note_made(const TransactionReport& report, const std::vector<Part>& after, time_ns_t began_ns,
                  Owner owner) {
     const time_ns_t ended_ns = seeds::now_ns();
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       if (!owns(owner, i) || (after[i].gain == parts_[i].gain && after[i].core == parts_[i].core)) continue;
-      time_ns_t instant_ns = kNotMeasured;
-      for (const StepReport& step : report.steps) {
-        if (step.component == parts_[i].name && step.instant_ns != kNotMeasured) instant_ns = step.instant_ns;
-      }
+      const time_ns_t instant_ns = instant_of(report, parts_[i].name);
       expect(instant_ns == kNotMeasured || instant_ns == report.instant_ns,
              parts_[i].name + " has another instant than the change");
       made_.push_back({.component = static_cast<int>(i),
@@ -358,7 +416,8 @@ class RandomArchitecture {
   void check_executions() {
     std::map<int, time_ns_t> last_clocks;
     for (const Execution& execution : shared_->executions) {
-      const Part& part = parts_[static_cast<std::size_t>(execution.component)];
+      const Part part = execution.component == kExtra ? Part{.name = "extra", .period_ns = kExtraPeriod}
+                                                      : parts_[static_cast<std::size_t>(execution.component)];
       const std::string where = part.name + " at clock " + std::to_string(execution.clock_ns) + " (core " +
                                 std::to_string(execution.core) + ", gain " + std::to_string(execution.gain) +
                                 ")";
@@ -367,17 +426,21 @@ class RandomArchitecture {
              where + " executes not later than before, at " + std::to_string(last->second));
       last->second = execution.clock_ns;
       expect((execution.clock_ns - epoch_ns_) % part.period_ns == 0, where + " is not on its grid");
-      std::vector<std::pair<double, int>> possible{{1.0, execution.component}};
+      std::vector<std::pair<double, int>> possible{
+          {1.0, execution.component}};  // at first the extra one is absent
       for (const Made& made : made_) {
         if (made.component != execution.component || !may_be_after(execution, made)) continue;
+        if (made.removed != kAbsent && made.removed != execution.core) continue;
         if (!may_be_before(execution, made)) possible.clear();
         possible.emplace_back(made.gain, made.core);
       }
       const bool is_known =
           std::ranges::find(possible, std::pair(execution.gain, execution.core)) != possible.end();
-      expect(is_known, where + " executes with parts of another side of a change; expected core " +
-                           std::to_string(possible.back().second) + ", gain " +
-                           std::to_string(possible.back().first));
+      std::string expected;
+      for (const auto& [gain, core] : possible)
+        expected += " (core " + std::to_string(core) + ", gain " + std::to_string(gain) + ")";
+      expect(is_known, where + " executes at " + std::to_string(execution.at_ns) +
+                           " with parts of another side of a change; expected one of" + expected);
     }
   }
 
@@ -393,6 +456,7 @@ class RandomArchitecture {
   std::vector<Part> parts_;
   std::vector<Made> made_;
   int next_core_{0};
+  int extra_{kAbsent};  // the core of the component that is added and removed
   double next_gain_{1.0};
 };
 
