@@ -3,6 +3,7 @@
 // MAUVE_SEEDS asks for so many seeds, MAUVE_SEED for the first of them, MAUVE_SEED_TRACE for a file with the calls of that one.
 #include <gtest/gtest.h>
 
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <map>
@@ -42,6 +43,21 @@ void deploy_two(std::uint64_t /*seed*/, Findings& findings) {
   findings.expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
 }
 
+/// Two threads lock two mutexes, each in its own order.
+void lock_crosswise(std::uint64_t /*seed*/, Findings& /*findings*/) {
+  Mutex one;
+  Mutex other;
+  OrdinaryThread thread([&] {
+    const LockGuard first(one);
+    const LockGuard second(other);
+  });
+  {
+    const LockGuard first(other);
+    const LockGuard second(one);
+  }
+  thread.join();
+}
+
 template <typename Scenario>
 void run_seeds(const Scenario& scenario, std::uint64_t count) {
   const std::uint64_t first = asked("MAUVE_SEED", 1);
@@ -73,6 +89,13 @@ void run_twice(const Scenario& scenario) {
   const std::uint64_t first = asked("MAUVE_SEED", 1);
   const std::uint64_t end = first + asked("MAUVE_SEEDS", 20);
   for (std::uint64_t seed = first; seed < end; ++seed) run_twice(scenario, seed);
+}
+
+TEST(SeededScheduler, FindsADeadlockAndFindsItAgain) {
+  std::uint64_t seed = 1;
+  while (seed < 1000 && run_forked(lock_crosswise, seed).status == 0) ++seed;
+  ASSERT_LT(seed, 1000U);
+  EXPECT_EQ(SIGABRT, WTERMSIG(run_forked(lock_crosswise, seed).status));
 }
 
 TEST(SeedsOfADeployment, GiveTheSameRunTwice) { run_twice(deploy_two); }

@@ -57,7 +57,7 @@ struct Outcome {
   std::uint64_t switches{0};
   time_ns_t passed_ns{0};
   time_ns_t stalled_ns{0};  // of that, the computer stood still
-  int alive{0};  // threads that have not ended
+  int alive{0};             // threads that have not ended
   bool operator==(const Outcome&) const = default;
 };
 
