@@ -155,8 +155,8 @@ void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
   }
   for (Component* component : added_) component->enter(architecture_);
   if (is_structural_) architecture_.commit_gate().restructured();
-  advance(Phase::made);
-  architecture_.note_open();  // last: who settles takes the hint back, then looks at the phase
+  MAUVE_RT_TRUSTED(advance(Phase::made));  // a store: only a broken contract throws
+  architecture_.note_open();               // last: who settles takes the hint back, then looks at the phase
   architecture_.changes().bump();
 }
 

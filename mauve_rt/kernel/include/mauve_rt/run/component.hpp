@@ -356,7 +356,10 @@ class Component final : public Configurable {
   /// claimed.
   void settle_probation(bool at_once = false) noexcept;
   /// It takes the place of one whose core on probation hangs: that was its last probation. [setup]
-  void begin_with(ProbationRecord last) { last_probation_ = std::move(last); }
+  void begin_with(ProbationRecord last) {
+    const LockGuard lock(shown_mutex_);
+    last_probation_ = std::move(last);
+  }
   /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
   void conclude_probation() noexcept;
 

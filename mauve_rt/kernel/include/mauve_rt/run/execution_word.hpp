@@ -170,7 +170,7 @@ class ExecutionWord {
   static constexpr std::uint32_t kNext = 16;  // the number above both
 
   std::uint32_t phase() const noexcept { return word_.load(std::memory_order_acquire) & kPhase; }
-  void exchange_phase(std::uint32_t from, std::uint32_t to) noexcept {
+  void exchange_phase(std::uint32_t from, std::uint32_t to) MAUVE_RT {
     std::uint32_t word = (word_.load(std::memory_order_acquire) & ~kPhase) | from;
     const bool was_from =
         word_.compare_exchange_strong(word, (word & ~kPhase) | to, std::memory_order_acq_rel);
