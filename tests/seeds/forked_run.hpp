@@ -19,6 +19,12 @@
 
 namespace mauve::seeds {
 
+/// Of the environment; empty: it is not set.
+inline std::string variable(const char* name) {
+  const char* const text = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): no thread sets a variable
+  return text != nullptr ? text : "";
+}
+
 /// What a scenario found to be wrong; empty: nothing.
 class Findings {
  public:
@@ -73,9 +79,8 @@ Run run_forked(const Scenario& scenario, std::uint64_t seed, const std::string& 
     CPU_SET(static_cast<std::size_t>(sched_getcpu()), &here);
     sched_setaffinity(0, sizeof(here), &here);
     Options options{.seed = seed, .longest_ns = 60'000'000'000, .keeps_trace = !trace.empty()};
-    const char* until_ms =
-        std::getenv("MAUVE_SEED_UNTIL_MS");  // NOLINT(concurrency-mt-unsafe): nobody sets any
-    if (until_ms != nullptr) options.longest_ns = std::stoll(until_ms) * 1'000'000;
+    if (const std::string until_ms = variable("MAUVE_SEED_UNTIL_MS"); !until_ms.empty())
+      options.longest_ns = std::stoll(until_ms) * 1'000'000;
     begin(options);
     Findings findings;
     try {

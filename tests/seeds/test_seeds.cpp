@@ -19,8 +19,8 @@ using seeds::Findings;
 using seeds::Run;
 
 std::uint64_t asked(const char* variable, std::uint64_t otherwise) {
-  const char* text = std::getenv(variable);  // NOLINT(concurrency-mt-unsafe): nobody sets any
-  return text == nullptr ? otherwise : std::stoull(text);
+  const std::string text = seeds::variable(variable);
+  return text.empty() ? otherwise : std::stoull(text);
 }
 
 /// Deploys two components, lets them run, shuts down.
@@ -74,8 +74,7 @@ void run_seeds(const Scenario& scenario, std::uint64_t count) {
 
 template <typename Scenario>
 void run_twice(const Scenario& scenario, std::uint64_t seed) {
-  const char* trace = std::getenv("MAUVE_SEED_TRACE");  // NOLINT(concurrency-mt-unsafe): nobody sets any
-  const std::string file = trace != nullptr ? trace : "";
+  const std::string file = seeds::variable("MAUVE_SEED_TRACE");
   const Run one = run_forked(scenario, seed, file);
   const Run other = run_forked(scenario, seed, file.empty() ? "" : file + ".again");
   EXPECT_EQ(0, one.status);

@@ -47,7 +47,7 @@ bool EventInput::is_for_the_same(const EventInput& other) const noexcept {
 
 void EventInput::take_over(std::span<const std::unique_ptr<State>> before) noexcept {
   if (resource_ == nullptr) return is_live_.store(true, std::memory_order_relaxed);
-  const LockGuard lock(resource_->events_mutex());  // a write tells both, or is told to the one that counts
+  const LockGuard lock(resource_->events_mutex());  // a write reaches both inputs, or the one that counts
   if (const time_ns_t time = unconsumed_by_all(before); time != kNone) keep(time);
   is_live_.store(true, std::memory_order_relaxed);
 }

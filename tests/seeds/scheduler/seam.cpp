@@ -49,6 +49,7 @@ void yield_thread() noexcept {
 void process_barrier() noexcept { seeds::step(Call::barrier); }
 bool has_process_barrier() noexcept { return true; }
 
+/// No signal comes: the caller waits for ever.
 int await_signal(const sigset_t& /*signals*/) noexcept {
   for (;;) seeds::block(Call::signal_wait, nullptr, kForever, false);
 }

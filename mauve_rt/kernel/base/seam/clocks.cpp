@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/base/seam/clocks.hpp"
 
-#include <ctime>
+#include "base/seam/timespec.hpp"
 
 namespace mauve {
 
@@ -10,7 +10,7 @@ namespace {
 time_ns_t read_clock(clockid_t clock) MAUVE_RT {
   timespec now{};
   MAUVE_RT_TRUSTED(clock_gettime(clock, &now));  // reads a page of the system's, and makes no call of it
-  return time_ns_t{now.tv_sec} * 1'000'000'000 + now.tv_nsec;
+  return to_ns(now);
 }
 
 }  // namespace

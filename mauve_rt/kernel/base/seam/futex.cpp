@@ -8,7 +8,8 @@
 #include <algorithm>
 #include <cerrno>
 #include <climits>
-#include <ctime>
+
+#include "base/seam/timespec.hpp"
 
 namespace mauve {
 
@@ -33,7 +34,7 @@ int futex(const std::atomic<std::uint32_t>& word, int operation, std::uint32_t v
 bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
                       time_ns_t until_ns) noexcept {
   until_ns = std::max<time_ns_t>(0, until_ns);  // the system refuses instants before its clock began
-  const timespec until{.tv_sec = until_ns / s_to_ns(1), .tv_nsec = until_ns % s_to_ns(1)};
+  const timespec until = to_timespec(until_ns);
   for (;;) {
     // FUTEX_WAIT_BITSET: the timeout is an absolute instant of CLOCK_MONOTONIC
     const int error =

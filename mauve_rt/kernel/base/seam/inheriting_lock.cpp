@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/base/seam/inheriting_lock.hpp"
 
-#include <ctime>
-
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/sleep.hpp"
+
+#include "base/seam/timespec.hpp"
 
 namespace mauve {
 
@@ -20,12 +20,11 @@ InheritingLock::InheritingLock() {
 
 bool InheritingLock::try_lock_until(time_ns_t instant_ns) noexcept {
 #if !defined(__SANITIZE_THREAD__)  // it does not know the timed lock of the monotonic clock
-  constexpr time_ns_t kSecond = 1'000'000'000;
-  const timespec until{.tv_sec = instant_ns / kSecond, .tv_nsec = instant_ns % kSecond};
+  const timespec until = to_timespec(instant_ns);
   const int result = MAUVE_RT_TRUSTED(pthread_mutex_clocklock(&mutex_, CLOCK_MONOTONIC, &until));
   if (result != EINVAL) return result == 0;  // else the system has no timed lock with inheritance
 #endif
-  constexpr time_ns_t kBetweenTries = 50'000;
+  constexpr time_ns_t kBetweenTries = us_to_ns(50);
   while (!try_lock()) {
     if (monotonic_now_ns() >= instant_ns) return false;
     sleep_for(kBetweenTries);

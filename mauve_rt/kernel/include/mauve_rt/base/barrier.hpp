@@ -20,7 +20,7 @@ class Barrier {
   Barrier(const Barrier&) = delete;
   Barrier& operator=(const Barrier&) = delete;
 
-  /// So many arrive, or never will; the caller waits for nobody.
+  /// So many arrive, or never will; the caller does not wait.
   void arrive(std::uint32_t parties) noexcept {
     if (missing_.fetch_sub(parties, std::memory_order_acq_rel) == parties) futex_wake_all(missing_);
   }
