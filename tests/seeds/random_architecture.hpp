@@ -1,107 +1,24 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// A scenario of the seeds: an architecture of 1 to 5 components, random requests, and what must hold whatever the interleaving.
+// A scenario of the seeds: an architecture of 1 to 12 components, random requests, and what must hold whatever the interleaving.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <map>
 #include <memory>
 #include <optional>
-#include <random>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/base/seam/sleep.hpp"
+#include "mauve_rt/base/seam/thread.hpp"
 
-#include "fixtures.hpp"
-#include "forked_run.hpp"
+#include "scenario/history.hpp"
+#include "scenario/seed_parts.hpp"
 
 namespace mauve::testing {
-
-/// Draws the same numbers from the same seed on every computer.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
-  int below(int bound) { return static_cast<int>(random_() % static_cast<std::uint64_t>(bound)); }
-  bool once_in(int times) { return below(times) == 0; }
-  time_ns_t between(time_ns_t least_ns, time_ns_t most_ns) {
-    return least_ns + static_cast<time_ns_t>(random_() % static_cast<std::uint64_t>(most_ns - least_ns + 1));
-  }
-
- private:
-  std::mt19937_64 random_;
-};
-
-struct Execution {
-  int component;
-  time_ns_t clock_ns;
-  time_ns_t at_ns;
-  int core;
-  double gain;
-};
-
-/// What all cores of a run share. One thread runs at a time: nothing needs a lock.
-struct Shared {
-  std::vector<Execution> executions{};
-  bool hung_may_go_on{false};
-  int hung{0}, thrown{0};
-};
-
-enum class Manner : std::uint8_t { good, slow, throws, hangs, refuses, throws_in_adopt, slow_in_adopt };
-inline constexpr std::array kMannerNames{
-    "good", "slow", "throws", "hangs", "refuses", "throws_in_adopt", "slow_in_adopt"};
-
-/// Notes each of its executions, and behaves badly after some.
-class SeedCore : public TestCore {
- public:
-  SeedCore(std::shared_ptr<Shared> shared, int component, int number, Manner manner, std::uint64_t seed)
-      : number_(number), shared_(std::move(shared)), component_(component), manner_(manner), dice_(seed) {}
-
-  void act() override {
-    TestCore::act();
-    shared_->executions.push_back({.component = component_,
-                                   .clock_ns = clock_ns(),
-                                   .at_ns = seeds::now_ns(),
-                                   .core = number_,
-                                   .gain = exposed_shell().gain.value()});
-    const bool is_bad = ++runs_here_ > 3 && dice_.once_in(4);
-    if (manner_ == Manner::throws && is_bad) fail();
-    if (manner_ == Manner::hangs && is_bad) hang();
-    compute(manner_ == Manner::slow ? us_to_ns(900) : us_to_ns(60));
-  }
-  bool adopt(const CoreBase& /*old*/) override {
-    if (manner_ == Manner::throws_in_adopt) throw std::runtime_error("as the seed wants");
-    if (manner_ == Manner::slow_in_adopt) sleep_for(dice_.between(us_to_ns(100), ms_to_ns(8)));
-    compute(us_to_ns(20));
-    return manner_ != Manner::refuses;
-  }
-  void take(CoreBase& /*old*/) noexcept override { compute(us_to_ns(20)); }
-  std::string description() const override { return "core " + std::to_string(number_); }
-
- private:
-  void compute(time_ns_t most_ns) noexcept {
-    const time_ns_t until_ns = monotonic_now_ns() + dice_.between(0, most_ns);
-    while (monotonic_now_ns() < until_ns) {
-    }
-  }
-  void fail() const {
-    ++shared_->thrown;
-    throw std::runtime_error("as the seed wants");
-  }
-  void hang() noexcept {
-    ++shared_->hung;
-    while (!shared_->hung_may_go_on) sleep_for(ms_to_ns(1));
-  }
-
-  int number_;
-  int runs_here_{0};
-  std::shared_ptr<Shared> shared_;
-  int component_;
-  Manner manner_;
-  Dice dice_;
-};
 
 class RandomArchitecture {
  public:
@@ -120,45 +37,42 @@ class RandomArchitecture {
       Deployer deployer(architecture);
       deployer_ = &deployer;
       deployer.deploy();
-      epoch_ns_ = deployer.epoch_ns();
+      history_.note(Epoch{.epoch_ns = deployer.epoch_ns(), .instant_ns = 0});
       OrdinaryThread other([this] { operate(); });
       for (int requests = 3 + dice_.below(25); requests > 0; --requests) {
         sleep_for(dice_.between(0, ms_to_ns(dice_.once_in(4) ? 40 : 4)));
         request();
       }
       if (dice_.once_in(2)) {
-        timed("shutdown", kShutdown, [&] { deployer.shutdown(); });
+        shut_down("shutdown");
         other.join();
       } else {
         other.join();
-        timed("shutdown", kShutdown, [&] { deployer.shutdown(); });
+        if (dice_.once_in(4)) expect_alive();
+        shut_down("shutdown");
       }
       shared_->hung_may_go_on = true;
+      if (dice_.once_in(
+              2)) {  // else an architecture that ends leaves behind what a hook uses that was called off
+        sleep_for(ms_to_ns(20));
+        leaves_nothing_ = true;
+      }
     }
-    check_executions();
+    settle();
+    history_.check(*shared_);
     findings_.count("executions", static_cast<int>(shared_->executions.size()));
-    findings_.count("hung cores", shared_->hung);
-    findings_.count("thrown exceptions", shared_->thrown);
-    for (int tries = 0; tries < 1000 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
-    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
   }
 
  private:
   struct Part {
     std::string name;
     time_ns_t period_ns;
+    bool is_sporadic;
+    bool has_fallback;
     double gain{1.0};
     int core{0};
-  };
-  /// A change that was made, as one component sees it.
-  struct Made {
-    int component;
-    time_ns_t instant_ns;  // T, where it is known
-    time_ns_t began_ns, ended_ns;
-    double gain;
-    int core;
-    int removed{
-        kAbsent};  // the core that a removal is about: T may be before executions of an earlier component of that name
+    double input{kUnconnected};
+    int trial{kNone};  // the core on probation
   };
 
   /// Which client changes a component: the only one, or each of two every other.
@@ -167,10 +81,12 @@ class RandomArchitecture {
     return owner == Owner::only || component % 2 == (owner == Owner::first ? 0U : 1U);
   }
 
-  static constexpr int kExtra = -1, kAbsent = -1;  // a component, a core
+  static constexpr int kExtra = 1000;  // components that are added, from this number on
   static constexpr time_ns_t kExtraPeriod = ms_to_ns(3);
   static constexpr time_ns_t kSlack = ms_to_ns(150);
   static constexpr time_ns_t kShutdown = Deployer::kStopTimeout + ms_to_ns(500) + kSlack;
+  static constexpr time_ns_t kPrepare = ms_to_ns(30);
+  static constexpr time_ns_t kCleanup = s_to_ns(1);  // who asked waits so long for the cleanup of what is out
 
   void expect(bool is_true, const std::string& otherwise) { findings_.expect(is_true, otherwise); }
 
@@ -182,65 +98,97 @@ class RandomArchitecture {
     findings_.note(what);
     request();
     findings_.note("end of " + what);
+    if (!shared_->hung_cores.empty()) longest_ns += kCleanup;
     const time_ns_t took_ns = seeds::now_ns() - began_ns - (seeds::outcome().stalled_ns - stalled_ns);
     expect(took_ns <= longest_ns, what + " took " + std::to_string(took_ns / 1000) +
                                       " us, expected at most " + std::to_string(longest_ns / 1000) + " us");
   }
+  /// A command is carried out, or refused with a reason.
+  template <typename Request>
+  void command(const std::string& what, time_ns_t longest_ns, Request&& request) {
+    timed(what, longest_ns, [&] {
+      try {
+        request();
+      } catch (const Error& error) {
+        findings_.count("commands refused");
+        findings_.note(what + ": refused: " + error.what());
+        expect(error.code() != ErrorCode::internal, what + ": internal error: " + error.what());
+      }
+    });
+  }
+
+  // ---- the architecture
 
   void declare() {
-    const int count = 1 + dice_.below(5);
+    const int count = dice_.once_in(4) ? 6 + dice_.below(7) : 1 + dice_.below(5);
+    for (int i = 0; i < count; ++i)
+      architecture_->add_resource<LatestValue<Number>>("out" + std::to_string(i));
     for (int i = 0; i < count; ++i) {
-      const std::int64_t period_ms = 2 + dice_.below(9);
-      parts_.push_back(
-          {.name = "c" + std::to_string(i), .period_ns = ms_to_ns(period_ms), .core = next_core_});
-      Component& component = architecture_->add_component(parts_.back().name, std::make_unique<TestShell>(),
-                                                          core(i, Manner::good), std::make_unique<TestFsm>(),
-                                                          {.priority = 10 + 10 * dice_.below(4)});
+      const std::int64_t period_ms = (2 + dice_.below(9)) * (1 + count / 5);
+      parts_.push_back({.name = "c" + std::to_string(i),
+                        .period_ns = ms_to_ns(period_ms),
+                        .is_sporadic = dice_.once_in(6),
+                        .has_fallback = dice_.once_in(5)});
+      Part& part = parts_.back();
+      part.core = next_core_;
+      const bool is_bounded = dice_.once_in(5);
+      auto fsm = part.is_sporadic ? new_part<FsmBase, EventFsm>()
+                 : is_bounded     ? new_part<FsmBase, BoundedFsm>()
+                                  : new_part<FsmBase, SeedFsm>();
+      Component& component = architecture_->add_component(
+          part.name, new_part<Shell, TestShell>(), core(i, Manner{}), std::move(fsm),
+          {.priority = 10 + 10 * dice_.below(4),
+           .overrun = dice_.once_in(6) ? OverrunPolicy::catch_up : OverrunPolicy::skip,
+           .max_backlog = 100,
+           .hung_after_ns = dice_.once_in(2) ? ms_to_ns(40) : 0});
       component.set_property("period_ms", period_ms);
+      architecture_->connect(part.name, "output", "out" + std::to_string(i), "write");
+      const int target = dice_.below(count);
+      if (part.is_sporadic || dice_.once_in(2)) {
+        architecture_->connect(part.name, "input", "out" + std::to_string(target), "read");
+        part.input = written_by(target);
+      }
+      if (part.has_fallback) component.set_fallback(fallback(i));
+      for (const auto& [aspect, value] : aspects_of(part))
+        history_.note(Made{.component = i, .aspect = aspect, .value = value, .instant_ns = 0});
     }
     architecture_->configure();
   }
 
-  std::unique_ptr<CoreBase> core(int component, Manner manner) {
+  std::unique_ptr<CoreBase> core(int component, Manner manner, bool is_on_probation = false) {
     const int number = next_core_++;
-    return std::make_unique<SeedCore>(shared_, component, number, manner,
-                                      seed_ * 1000 + static_cast<std::uint64_t>(number));
+    auto made = std::make_unique<SeedCore>(shared_, component, number, manner,
+                                           seed_ * 1000 + static_cast<std::uint64_t>(number));
+    if (is_on_probation) made->set_on_probation();
+    return made;
   }
-  static Manner any_manner(Dice& dice) {
-    if (dice.once_in(2)) return Manner::good;
-    return static_cast<Manner>(dice.below(static_cast<int>(kMannerNames.size())));
+  /// Each instance has a number of its own.
+  std::unique_ptr<CoreBase> fallback(int component) {
+    auto make = [shared = shared_, component, next = next_fallback_,
+                 seed = seed_]() -> std::unique_ptr<CoreBase> {
+      const int number = (*next)++;
+      return std::make_unique<SeedCore>(shared, component, number, Manner{},
+                                        seed * 1000 + static_cast<std::uint64_t>(number));
+    };
+    auto first = make();
+    first->set_factory(make);
+    return first;
   }
+
+  static std::map<Aspect, double> aspects_of(const Part& part) {
+    return {{Aspect::core, part.core},
+            {Aspect::gain, part.gain},
+            {Aspect::input, part.input},
+            {Aspect::period, part.is_sporadic ? 0.0 : static_cast<double>(part.period_ns)}};
+  }
+
   int any(Dice& dice) const { return dice.below(static_cast<int>(parts_.size())); }
+
+  // ---- the clients
 
   void request() {
     if (!dice_.once_in(4)) return change(dice_, two_change_ ? Owner::first : Owner::only);
     command(dice_);
-  }
-
-  /// A start, a stop, a look.
-  void command(Dice& dice) {
-    const std::string& name = parts_[static_cast<std::size_t>(any(dice))].name;
-    const time_ns_t patience_ns = dice.between(0, ms_to_ns(60));
-    try {
-      switch (dice.below(6)) {
-        case 0:
-          return timed("start " + name, s_to_ns(1) + kSlack, [&] { deployer_->start(name); });
-        case 1:
-        case 2:
-          return timed("stop " + name, patience_ns + kSlack, [&] { deployer_->stop(name, patience_ns); });
-        case 3:
-          return timed("forced stop " + name, patience_ns + kSlack,
-                       [&] { deployer_->stop(name, StopOptions{.timeout_ns = patience_ns, .force = true}); });
-        case 4:
-          return timed("abandon " + name, kSlack, [&] { deployer_->abandon(name); });
-        default:
-          timed("describe", kSlack, [&] { deployer_->describe(); });
-          timed("drain the trace", kSlack, [&] { deployer_->drain_trace(); });
-      }
-    } catch (const Error& error) {
-      findings_.count("commands refused");
-      expect(error.code() != ErrorCode::internal, std::string("internal error: ") + error.what());
-    }
   }
 
   /// The second client: commands at any moment, and the shutdown in some seeds.
@@ -254,26 +202,79 @@ class RandomArchitecture {
         command(dice);
       }
     }
-    if (shuts_down_) timed("shutdown of the second client", kShutdown, [&] { deployer_->shutdown(); });
+    if (shuts_down_) shut_down("shutdown of the second client");
   }
 
-  /// By the description each component has its gain. One that is late to a change that was made, or was given up there, may show
-  /// the old one.
-  void expect_gains(const std::string& after_what, Owner owner) {
-    for (const ComponentFacts& facts : architecture_->describe().components) {
-      const auto part = std::ranges::find(parts_, facts.name, &Part::name);
-      if (part == parts_.end()) continue;
-      if (!owns(owner, static_cast<std::size_t>(part - parts_.begin()))) continue;
-      const auto component = architecture_->find_component(facts.name);
-      if (architecture_->find_awaited(facts.name) != nullptr || component->task().is_left_behind()) continue;
-      for (const ShownProperty& property : facts.parts.properties) {
-        if (property.name != "gain") continue;
-        const double found = std::get<double>(property.value);
-        expect(found == part->gain, after_what + ": found gain " + std::to_string(found) + " of " +
-                                        facts.name + ", expected " + std::to_string(part->gain));
-      }
+  void shut_down(const std::string& what) {
+    shared_->is_shut_down = true;
+    timed(what, kShutdown, [&] { deployer_->shutdown(); });
+  }
+
+  /// A start, a stop, a look.
+  void command(Dice& dice) {
+    const auto index = static_cast<std::size_t>(any(dice));
+    const std::string& name = parts_[index].name;
+    const time_ns_t patience_ns = dice.between(0, ms_to_ns(60));
+    switch (dice.below(9)) {
+      case 0:
+        ++starts_;
+        return command("start " + name, s_to_ns(2) + kSlack, [&] { deployer_->start(name); });
+      case 1:
+      case 2:
+        return command("stop " + name, patience_ns + kSlack, [&] {
+          const int starts = starts_;
+          deployer_->stop(name, patience_ns);
+          expect_safe(index, starts);
+        });
+      case 3:
+        return command("forced stop " + name, patience_ns + kSlack, [&] {
+          const int starts = starts_;
+          deployer_->stop(name, StopOptions{.timeout_ns = patience_ns, .force = true});
+          expect_safe(index, starts);
+        });
+      case 4:
+        return command("abandon " + name, kSlack, [&] { deployer_->abandon(name); });
+      case 5:
+        return command("revert " + name, patience_ns + s_to_ns(1) + kSlack,
+                       [&] { deployer_->revert_probation(name, "as the seed wants", patience_ns); });
+      case 6:
+        command("settle", s_to_ns(1) + kSlack, [&] { deployer_->settle_probations(); });
+        return look_at_verdicts();
+      default:
+        command("describe", kSlack, [&] { deployer_->describe(); });
+        command("open changes", kSlack, [&] { deployer_->open_changes(); });
+        command("drain the trace", kSlack, [&] { deployer_->drain_trace(); });
+        command("shadows", kSlack, [&] { deployer_->shadows(); });
     }
   }
+
+  /// A stop that has ended means safe outputs, unless somebody starts the component.
+  void expect_safe(std::size_t index, int starts) {
+    const auto component = architecture_->find_component(parts_[index].name);
+    if (component == nullptr || starts != starts_ || changes_under_way_ > 0) return;
+    Resource& output = architecture_->resource("out" + std::to_string(index));
+    double found = 0.0;
+    output.read_number(output.find_number("value").value(), found);
+    expect(found == 0.0, "stopped " + parts_[index].name + " has output " + std::to_string(found));
+    findings_.count("safe outputs after a stop");
+  }
+
+  /// No verdict is "passed" for a core that hangs.
+  void look_at_verdicts() {
+    for (const ProbationRecord& record : deployer_->probations()) {
+      if (record.verdict == ProbationVerdict::running) continue;
+      const int core = core_of(record.to_core);
+      const auto hung = shared_->hung_cores.find(core);
+      const time_ns_t end_ns = record.begin_ns + trials_.at(core);
+      expect(record.verdict != ProbationVerdict::passed || hung == shared_->hung_cores.end() ||
+                 hung->second >= end_ns,
+             "core " + std::to_string(core) + " hangs in a release of its probation, and has passed it");
+      history_.note_verdict(core, record.verdict);
+      findings_.count(std::string("probations ") + to_string(record.verdict));
+    }
+  }
+
+  // ---- changes
 
   void change(Dice& dice, Owner owner) {
     Transaction transaction;
@@ -282,98 +283,231 @@ class RandomArchitecture {
     next_gain_ = next_gain_ > 9.0 ? 0.125 : next_gain_ + 0.125;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       if (!owns(owner, i) || dice.once_in(2)) continue;
-      const std::string& name = parts_[i].name;
-      if (dice.once_in(2)) {
-        transaction.set_property(name, "gain", after[i].gain = next_gain_);
-        text += " gain " + name;
+      Part& part = after[i];
+      part.trial = kNone;
+      if (dice.once_in(10)) {
+        enter_shadow(transaction, static_cast<int>(i), part, dice, text);
+        continue;
       }
       if (dice.once_in(2)) {
-        const Manner manner = any_manner(dice);
-        after[i].core = next_core_;
-        transaction.replace_core(name, core(static_cast<int>(i), manner));
-        text += std::string(" core ") + kMannerNames[static_cast<std::size_t>(manner)] + " " + name;
+        transaction.set_property(part.name, "gain", part.gain = next_gain_);
+        text += " gain " + part.name;
       }
       if (dice.once_in(6)) {
-        transaction.replace_fsm(name, std::make_unique<TestFsm>());  // keeps its place
-        text += " fsm " + name;
+        text += " input " + part.name;
+        wire(transaction, part, dice);
       }
-      if (dice.once_in(12)) transaction.stop(name);
-      if (dice.once_in(6)) transaction.start(name);
+      enter_parts(transaction, static_cast<int>(i), part, dice, text);
+      enter_command(transaction, part, dice, text);
     }
     const bool changes_extra = owner != Owner::second && dice.once_in(3);
-    int extra = extra_;
     if (changes_extra) {
-      extra = extra_ == kAbsent ? next_core_ : kAbsent;
-      text += extra_ == kAbsent ? " add extra" : " remove extra";
+      text += extra_ == kNone ? " add extra" : " remove extra";
       enter_extra(transaction, dice);
     }
+    const bool resynchronises = owner == Owner::only && dice.once_in(12);
+    if (resynchronises) {
+      transaction.resynchronise();
+      text += " resynchronise";
+    }
     if (transaction.steps().empty()) return;
+
     constexpr std::array kPatience{ms_to_ns(5), ms_to_ns(40), s_to_ns(1)};
-    const TransactionOptions options{
-        .timeouts = {.commit_ns = kPatience[static_cast<std::size_t>(dice.below(3))],
-                     .phase_ns = dice.once_in(2) ? 0 : ms_to_ns(30)},
-        .force = dice.once_in(6)};
+    TransactionOptions options{.timeouts = {.commit_ns = dice.one_of(kPatience),
+                                            .phase_ns = dice.once_in(2) ? 0 : ms_to_ns(30),
+                                            .prepare_ns = kPrepare},
+                               .dry_run = dice.once_in(10),
+                               .force = dice.once_in(6)};
     const std::uint64_t revision = architecture_->revision();
     const time_ns_t began_ns = seeds::now_ns();
-    std::optional<TransactionReport> report;
+    ++starts_;
+    ++changes_under_way_;
     std::string refusal;
-    time_ns_t longest_ns = 2 * options.timeouts.commit_ns + options.timeouts.phase_ns + kSlack;
+    const std::optional<TransactionReport> report =
+        carry_out(dice, text, std::move(transaction), options, resynchronises, owner, refusal);
+    --changes_under_way_;
+    findings_.note(report ? "made, T " + std::to_string(report->instant_ns) : "refused: " + refusal);
+    const std::string outcome = text + (report ? ": made" : ": refused: " + refusal);
+    findings_.count(report ? "changes made" : options.dry_run ? "dry runs" : "changes refused");
+    if (report) {
+      note_made(*report, after, began_ns, owner);
+      if (resynchronises)
+        history_.note(Epoch{.epoch_ns = deployer_->epoch_ns(),
+                            .instant_ns = report->instant_ns,
+                            .began_ns = began_ns,
+                            .ended_ns = seeds::now_ns()});
+      if (changes_extra) note_extra(*report);
+    }
+    if (owner != Owner::second) {
+      const bool is_listed = architecture_->find_component("extra") != nullptr;
+      expect(is_listed == (extra_ != kNone),
+             outcome + ": the list " + (is_listed ? "has" : "has not") + " the extra component");
+    }
+    // Commands and faults count, too.
+    const std::uint64_t least = revision + (report ? 1 : 0);
+    expect(architecture_->revision() >= least, outcome + ": revision " +
+                                                   std::to_string(architecture_->revision()) +
+                                                   ", expected at least " + std::to_string(least));
+    expect_described(outcome, owner);
+  }
+
+  /// Starts a component that stands, or stops one that runs; now and then the other way round, which is refused.
+  void enter_command(Transaction& transaction, const Part& part, Dice& dice, std::string& text) {
+    const auto component = architecture_->find_component(part.name);
+    if (component == nullptr || !dice.once_in(4)) return;
+    const bool starts = (component->task().state() != ComponentState::running) != dice.once_in(20);
+    if (!starts && !dice.once_in(3)) return;
+    if (starts) {
+      transaction.start(part.name);
+    } else {
+      transaction.stop(part.name);
+    }
+    text += (starts ? " start " : " stop ") + part.name;
+  }
+
+  void wire(Transaction& transaction, Part& part, Dice& dice) {
+    if (part.input != kUnconnected) transaction.disconnect(part.name, "input");
+    part.input = kUnconnected;
+    if (!part.is_sporadic && dice.once_in(3)) return;
+    const int target = any(dice);
+    transaction.connect(part.name, "input", "out" + std::to_string(target), "read");
+    part.input = written_by(target);
+  }
+
+  /// Gives a component a shadow; of one that has a shadow promotes or ends it.
+  void enter_shadow(Transaction& transaction, int index, Part& part, Dice& dice, std::string& text) {
+    for (const ShadowRecord& shadow : deployer_->shadows()) {
+      if (shadow.component != part.name || shadow.verdict != ShadowVerdict::running) continue;
+      if (dice.once_in(2)) {
+        transaction.promote(part.name);
+        part.core = core_of(shadow.core);
+        text += " promote " + part.name;
+      } else {
+        transaction.end_shadow(part.name);
+        text += " end of shadow " + part.name;
+      }
+      return;
+    }
+    if (part.is_sporadic) return;
+    const Manner manner = Manner::any(dice);
+    text += " shadow " + std::to_string(next_core_) + " (" + manner.name() + ") " + part.name;
+    transaction.shadow(part.name, core(index, manner), {.budget_ns = ms_to_ns(1)},
+                       std::make_unique<TestShell>());
+  }
+  static int core_of(const std::string& implementation) {
+    return std::stoi(implementation.substr(implementation.find("Core") + 4));
+  }
+
+  /// New parts of one component: a core, on probation or not, an fsm with the same period or another one, a shell.
+  void enter_parts(Transaction& transaction, int index, Part& part, Dice& dice, std::string& text) {
+    const Manner manner = Manner::any(dice);
+    bool is_on_probation = false;
+    if (dice.once_in(2)) {
+      is_on_probation = !part.is_sporadic && dice.once_in(3);
+      text += " core " + std::to_string(next_core_) + " (" + manner.name() +
+              (is_on_probation ? ", on probation" : "") + ") " + part.name;
+      part.core = next_core_;
+      auto fresh = core(index, manner, is_on_probation);
+      if (is_on_probation) {
+        part.trial = part.core;
+        trials_[part.trial] = dice.between(ms_to_ns(2), ms_to_ns(90));
+        transaction.replace_core(
+            part.name, std::move(fresh),
+            ProbationOptions{.duration_ns = trials_[part.trial], .on_overrun = dice.once_in(3)});
+      } else {
+        transaction.replace_core(part.name, std::move(fresh));
+      }
+    }
+    if (part.is_sporadic || !dice.once_in(6)) return;
+    if (!is_on_probation && dice.once_in(3)) {
+      const std::int64_t period_ms = 2 + dice.below(9);
+      transaction.set_property(part.name, "period_ms", period_ms);
+      part.period_ns = ms_to_ns(period_ms);
+      text += " period " + part.name;
+    }
+    if (!is_on_probation && dice.once_in(3)) {
+      transaction.replace_shell(part.name, std::make_unique<TestShell>());
+      text += " shell " + part.name;
+    }
+    transaction.replace_fsm(part.name, new_part<FsmBase, SeedFsm>());
+    text += " fsm " + part.name;
+  }
+
+  /// Adds the extra component and a resource that it writes, or removes both.
+  void enter_extra(Transaction& transaction, Dice& dice) {
+    if (extra_ != kNone) {
+      transaction.remove_component("extra");
+      transaction.remove_resource("extra_out");
+      return;
+    }
+    ComponentParts rest{.settings = {.priority = 10 + 10 * dice.below(4)}};
+    rest.properties["period_ms"] = std::int64_t{kExtraPeriod / ms_to_ns(1)};
+    next_extra_core_ = next_core_;
+    transaction.add_resource("extra_out", std::make_unique<LatestValue<Number>>());
+    transaction.add_component("extra",
+                              Parts{.shell = new_part<Shell, TestShell>(),
+                                    .core = core(kExtra + next_extra_, Manner{}),
+                                    .fsm = new_part<FsmBase, SeedFsm>()},
+                              rest);
+    transaction.connect("extra", "output", "extra_out", "write");
+    transaction.start("extra");
+  }
+
+  /// In one of the ways that there are: at once, in two halves, or prepared and committed by a real-time thread.
+  std::optional<TransactionReport> carry_out(Dice& dice, const std::string& text, Transaction transaction,
+                                             TransactionOptions options, bool resynchronises, Owner owner,
+                                             std::string& refusal) {
+    std::optional<TransactionReport> report;
+    time_ns_t longest_ns = 2 * options.timeouts.commit_ns + options.timeouts.phase_ns + kPrepare + kSlack;
+    longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(16);  // slow hooks, one after the other
+    if (two_change_) longest_ns *= 2;                                    // it waits for the other one's
     // A change that a shutdown overtakes waits for the thread of each of its components, one after the other.
-    if (two_change_) longest_ns *= 2;  // it waits for the other one's
     if (shuts_down_ || owner == Owner::second)
       longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(500);
+    const int way = options.dry_run || resynchronises ? 0 : dice.below(4);
+    if (way == 3) options.force = false;
     timed(text, longest_ns, [&] {
       try {
-        report = deployer_->commit(std::move(transaction), options);
+        if (way == 3) {
+          report = commit_prepared(dice, std::move(transaction), options);
+        } else if (way == 2) {
+          const auto made = deployer_->make(std::move(transaction), options);
+          report = made->report(options.timeouts.phase_ns);
+        } else {
+          report = deployer_->commit(std::move(transaction), options);
+        }
       } catch (const Error& error) {
         refusal = error.what();
         expect(error.code() != ErrorCode::internal, "internal error: " + refusal);
       }
     });
-    if (report) note_made(*report, after, began_ns, owner);
-    if (report && changes_extra) {
-      const int removed = std::exchange(extra_, extra);
-      made_.push_back({.component = kExtra,
-                       .instant_ns = instant_of(*report, "extra"),
-                       .began_ns = began_ns,
-                       .ended_ns = seeds::now_ns(),
-                       .gain = 1.0,
-                       .core = extra,
-                       .removed = removed});
-      findings_.count(extra == kAbsent ? "components removed" : "components added");
-    }
-    if (owner != Owner::second) {
-      const bool is_listed = architecture_->find_component("extra") != nullptr;
-      expect(is_listed == (extra_ != kAbsent), text + (report ? ": made" : ": refused: " + refusal) +
-                                                   ": the list " + (is_listed ? "has" : "has not") +
-                                                   " the extra component");
-    }
-    findings_.count(report ? "changes made" : "changes refused");
-    findings_.note(
-        (report ? "made, T " + std::to_string(report->instant_ns) : "refused: " + refusal) +
-        (changes_extra && report ? ", of extra " + std::to_string(instant_of(*report, "extra")) : ""));
-    // Commands and faults count, too.
-    const std::uint64_t least = revision + (report ? 1 : 0);
-    expect(architecture_->revision() >= least, text + ": revision " +
-                                                   std::to_string(architecture_->revision()) +
-                                                   ", expected at least " + std::to_string(least));
-    expect_gains(text + (report ? ": made" : ": refused: " + refusal), owner);
+    if (options.dry_run) report.reset();
+    return report;
   }
 
-  /// Adds the extra component, or removes it.
-  void enter_extra(Transaction& transaction, Dice& dice) {
-    if (extra_ != kAbsent) {
-      transaction.remove_component("extra");
-      return;
+  TransactionReport commit_prepared(Dice& dice, Transaction transaction, const TransactionOptions& options) {
+    const auto prepared = deployer_->prepare(std::move(transaction), options);
+    sleep_for(dice.between(0, ms_to_ns(3)));
+    if (dice.once_in(3)) {
+      prepared->commit(options.timeouts.commit_ns);
+    } else {
+      struct Order {
+        PreparedTransaction* prepared;
+        time_ns_t timeout_ns;
+      } order{.prepared = prepared.get(), .timeout_ns = options.timeouts.commit_ns};
+      Thread thread;
+      thread.start(
+          {.name = "rule", .priority = 97},
+          [](void* given) -> void* {
+            const auto& one = *static_cast<Order*>(given);
+            one.prepared->commit(one.timeout_ns);
+            return nullptr;
+          },
+          &order);
+      thread.join();
     }
-    ComponentParts rest{.settings = {.priority = 10 + 10 * dice.below(4)}};
-    rest.properties["period_ms"] = std::int64_t{kExtraPeriod / ms_to_ns(1)};
-    transaction.add_component("extra",
-                              Parts{.shell = new_part<Shell, TestShell>(),
-                                    .core = core(kExtra, Manner::good),
-                                    .fsm = new_part<FsmBase, TestFsm>()},
-                              rest);
-    transaction.start("extra");
+    findings_.count("prepared changes");
+    return prepared->complete();
   }
 
   static time_ns_t instant_of(const TransactionReport& report, const std::string& component) {
@@ -386,62 +520,108 @@ class RandomArchitecture {
 
   void note_made(const TransactionReport& report, const std::vector<Part>& after, time_ns_t began_ns,
                  Owner owner) {
-    const time_ns_t ended_ns = seeds::now_ns();
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (!owns(owner, i) || (after[i].gain == parts_[i].gain && after[i].core == parts_[i].core)) continue;
+      if (!owns(owner, i)) continue;
       const time_ns_t instant_ns = instant_of(report, parts_[i].name);
       expect(instant_ns == kNotMeasured || instant_ns == report.instant_ns,
              parts_[i].name + " has another instant than the change");
-      made_.push_back({.component = static_cast<int>(i),
-                       .instant_ns = instant_ns,
-                       .began_ns = began_ns,
-                       .ended_ns = ended_ns,
-                       .gain = after[i].gain,
-                       .core = after[i].core});
+      const auto before = aspects_of(parts_[i]);
+      for (const auto& [aspect, value] : aspects_of(after[i])) {
+        if (value == before.at(aspect)) continue;
+        history_.note(Made{.component = static_cast<int>(i),
+                           .aspect = aspect,
+                           .value = value,
+                           .instant_ns = instant_ns,
+                           .began_ns = began_ns,
+                           .ended_ns = seeds::now_ns(),
+                           .may_go_back = aspect == Aspect::core && after[i].trial != kNone});
+      }
       parts_[i] = after[i];
     }
   }
 
-  /// Whether an execution comes after a change: yes, no, or either where the change has no instant.
-  static bool may_be_before(const Execution& execution, const Made& made) {
-    if (made.instant_ns != kNotMeasured) return execution.clock_ns < made.instant_ns;
-    return execution.at_ns <= made.ended_ns;
-  }
-  static bool may_be_after(const Execution& execution, const Made& made) {
-    if (made.instant_ns != kNotMeasured) return execution.clock_ns >= made.instant_ns;
-    return execution.at_ns >= made.began_ns;
+  void note_extra(const TransactionReport& report) {
+    if (extra_ != kNone) {
+      extra_ = kNone;
+      findings_.count("components removed");
+      return;
+    }
+    extra_ = kExtra + next_extra_++;
+    const Part part{.name = "extra",
+                    .period_ns = kExtraPeriod,
+                    .is_sporadic = false,
+                    .has_fallback = false,
+                    .core = next_extra_core_};
+    for (const auto& [aspect, value] : aspects_of(part))
+      history_.note(Made{.component = extra_,
+                         .aspect = aspect,
+                         .value = value,
+                         .instant_ns = instant_of(report, "extra"),
+                         .ended_ns = seeds::now_ns()});
+    findings_.count("components added");
   }
 
-  /// Before T the old core and the old gain, from T on the new ones; each release on the grid, none twice.
-  void check_executions() {
-    std::map<int, time_ns_t> last_clocks;
-    for (const Execution& execution : shared_->executions) {
-      const Part part = execution.component == kExtra ? Part{.name = "extra", .period_ns = kExtraPeriod}
-                                                      : parts_[static_cast<std::size_t>(execution.component)];
-      const std::string where = part.name + " at clock " + std::to_string(execution.clock_ns) + " (core " +
-                                std::to_string(execution.core) + ", gain " + std::to_string(execution.gain) +
-                                ")";
-      const auto [last, is_first] = last_clocks.try_emplace(execution.component, execution.clock_ns);
-      expect(is_first || execution.clock_ns > last->second,
-             where + " executes not later than before, at " + std::to_string(last->second));
-      last->second = execution.clock_ns;
-      expect((execution.clock_ns - epoch_ns_) % part.period_ns == 0, where + " is not on its grid");
-      std::vector<std::pair<double, int>> possible{
-          {1.0, execution.component}};  // at first the extra one is absent
-      for (const Made& made : made_) {
-        if (made.component != execution.component || !may_be_after(execution, made)) continue;
-        if (made.removed != kAbsent && made.removed != execution.core) continue;
-        if (!may_be_before(execution, made)) possible.clear();
-        possible.emplace_back(made.gain, made.core);
+  // ---- what must hold
+
+  /// By the description each component is as the changes made it. One that is late to a change that was made, or was given up there,
+  /// may show what was before.
+  void expect_described(const std::string& after_what, Owner owner) {
+    for (const ComponentFacts& facts : architecture_->describe().components) {
+      const auto part = std::ranges::find(parts_, facts.name, &Part::name);
+      if (part == parts_.end()) continue;
+      const auto index = static_cast<std::size_t>(part - parts_.begin());
+      if (!owns(owner, index)) continue;
+      const auto component = architecture_->find_component(facts.name);
+      if (component == nullptr || architecture_->find_awaited(facts.name) != nullptr ||
+          component->task().is_left_behind())
+        continue;
+      for (const ShownProperty& property : facts.parts.properties) {
+        if (property.name != "gain") continue;
+        const double found = std::get<double>(property.value);
+        expect(found == part->gain, after_what + ": found gain " + std::to_string(found) + " of " +
+                                        facts.name + ", expected " + std::to_string(part->gain));
       }
-      const bool is_known =
-          std::ranges::find(possible, std::pair(execution.gain, execution.core)) != possible.end();
-      std::string expected;
-      for (const auto& [gain, core] : possible)
-        expected += " (core " + std::to_string(core) + ", gain " + std::to_string(gain) + ")";
-      expect(is_known, where + " executes at " + std::to_string(execution.at_ns) +
-                           " with parts of another side of a change; expected one of" + expected);
+      for (const ShownPort& port : facts.parts.ports) {
+        if (port.name != "input") continue;
+        const std::string expected =
+            part->input == kUnconnected
+                ? ""
+                : "out" + std::to_string(static_cast<int>(part->input - written_by(0)));
+        expect(port.resource == expected, after_what + ": the input of " + facts.name + " is connected to '" +
+                                              port.resource + "', expected '" + expected + "'");
+      }
     }
+  }
+
+  /// Each component that runs is released; nobody has lost a wake-up.
+  void expect_alive() {
+    constexpr time_ns_t kLongest = ms_to_ns(150);
+    std::map<std::string, ComponentState> states;
+    for (const auto& component : architecture_->components())
+      states[component->name()] = component->task().state();
+    const time_ns_t began_ns = seeds::now_ns();
+    sleep_for(kLongest + (seeds::outcome().stalled_ns > 0 ? ms_to_ns(60) : 0));
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const auto component = architecture_->find_component(parts_[i].name);
+      if (component == nullptr || states[parts_[i].name] != ComponentState::running ||
+          component->task().state() != ComponentState::running ||
+          shared_->hung_components.contains(static_cast<int>(i)))
+        continue;
+      const bool has_run = std::ranges::any_of(shared_->executions, [&](const Execution& execution) {
+        return execution.component == static_cast<int>(i) && execution.at_ns > began_ns;
+      });
+      findings_.count("components alive");
+      expect(has_run, parts_[i].name + " is running, and has not executed for " +
+                          std::to_string(kLongest / 1'000'000) + " ms");
+    }
+  }
+
+  /// After the end: no thread and no part is left.
+  void settle() {
+    for (int tries = 0; tries < 1000 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
+    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+    if (!leaves_nothing_ && !shared_->hung_cores.empty()) return;
+    for (const auto& [number, core] : shared_->cores) expect(false, "is left: " + core);
   }
 
   Dice dice_;
@@ -449,14 +629,18 @@ class RandomArchitecture {
   std::uint64_t seed_;
   bool shuts_down_;  // the second client, at any moment
   bool two_change_;  // the second client, too
-  std::shared_ptr<Shared> shared_{std::make_shared<Shared>()};
+  bool leaves_nothing_{false};
+  std::shared_ptr<Shared> shared_{std::make_shared<Shared>(findings_)};
+  History history_{findings_};
   Architecture* architecture_{nullptr};
   Deployer* deployer_{nullptr};
-  time_ns_t epoch_ns_{0};
   std::vector<Part> parts_;
-  std::vector<Made> made_;
   int next_core_{0};
-  int extra_{kAbsent};  // the core of the component that is added and removed
+  std::shared_ptr<int> next_fallback_{std::make_shared<int>(kFirstFallback)};
+  int extra_{kNone};  // the number of the component that is there
+  int next_extra_{0}, next_extra_core_{0};
+  std::map<int, time_ns_t> trials_;  // of each core on probation how long
+  int starts_{0}, changes_under_way_{0};
   double next_gain_{1.0};
 };
 

@@ -250,10 +250,14 @@ void Draft::resynchronise() {
   }
   resynchronise_step_ = step_;
   for (const auto& component : architecture_.components()) {
+    if (is_removed(component->name()) || is_unsettled(*component))
+      continue;  // one that is late keeps its grid
     const ComponentState state = component->task().state();
-    const bool can_take_part = state != ComponentState::faulted && state != ComponentState::unconfigured &&
-                               !is_unsettled(*component);  // one that is late
-    if (can_take_part && !is_removed(component->name())) touch(component->name());
+    if (state != ComponentState::faulted && state != ComponentState::unconfigured) {
+      touch(component->name());
+    } else if (find(component->name()) == nullptr) {
+      static_cast<void>(claim(component));  // no other change repairs and starts it on the old epoch
+    }
   }
 }
 

@@ -147,11 +147,15 @@ void TransactionCommit::Work::prepare() {
     at_step(resource.added_step, [&] { prepare_resource(resource); });
   for (DraftComponent& component : draft_->removed_components())
     at_step(component.first_step, [&] { prepare_removed(component); });
-  for (DraftComponent& component : draft_->components()) {
-    if (component.is_added) {
-      at_step(component.first_step, [&] { prepare_added(component); });
-    } else {
-      prepare_change(component);
+  // Promotes last: from there on the change acts on a core that is in use, and is not called off.
+  for (const bool promotes : {false, true}) {
+    for (DraftComponent& component : draft_->components()) {
+      if ((component.promoted != nullptr) != promotes) continue;
+      if (component.is_added) {
+        at_step(component.first_step, [&] { prepare_added(component); });
+      } else {
+        prepare_change(component);
+      }
     }
   }
   prefault_parts();
@@ -300,12 +304,16 @@ void TransactionCommit::Work::prepare_shadow(const DraftComponent& changed) {
   keep(component, std::make_unique<ShadowBegin>(component.task(), changed.shadow));
 }
 
-/// The candidate of a refused promote goes on in the shadow.
+/// A shadow that does not begin is cleaned up. The candidate of a refused promote goes on in its shadow.
 void TransactionCommit::Work::give_back_candidates() noexcept {
   if (draft_ == nullptr) return;
   for (DraftComponent& changed : draft_->components()) {
-    if (changed.shadow != nullptr)
-      changed.shadow->conclude(ShadowCause::closed, changed.component->task().clock().now_ns());
+    if (const auto& shadow = changed.shadow; shadow != nullptr) {
+      shadow->conclude(ShadowCause::closed, changed.component->task().clock().now_ns());
+      if (shadow->begin_retirement())
+        architecture_.dispose("cleanup of the shadow of " + changed.component->description(),
+                              [shadow] { shadow->retire(); });
+    }
     if (!changed.is_candidate_out) continue;
     std::unique_ptr<CoreBase> core = std::move(changed.fresh.core);
     for (Change& change : changes_) {

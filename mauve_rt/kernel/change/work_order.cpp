@@ -39,7 +39,9 @@ EarlierChange TransactionCommit::Work::look_at_earlier() const {
 
 bool TransactionCommit::Work::is_structural() const noexcept {
   const auto& steps = transaction_.steps();
-  return std::any_of(steps.begin(), steps.end(), [](const auto& step) { return step->is_structural(); });
+  return std::any_of(steps.begin(), steps.end(), [](const auto& step) {
+    return step->is_structural() || step->is_for_all();  // all components: none comes while it is prepared
+  });
 }
 
 void TransactionCommit::Work::claim_whole() noexcept {
@@ -59,11 +61,10 @@ void TransactionCommit::Work::release_whole() noexcept {
   claimed_ = {};
 }
 
-/// Others go on while this change prepares its parts and waits for its components. Not where no component is awaited, and
-/// not where all components have a part.
+/// Others go on while this change prepares its parts and waits for its components. Not where no component is awaited.
 std::unique_ptr<ChangeLock::Pause> TransactionCommit::Work::let_others_in() {
   numbers_after_ = architecture_.numbers();
-  if (!deployed_ || is_simulated_ || draft_->resynchronise_step() != 0) return nullptr;
+  if (!deployed_ || is_simulated_) return nullptr;
   return std::make_unique<ChangeLock::Pause>(architecture_.change_lock());
 }
 
@@ -74,8 +75,8 @@ bool TransactionCommit::Work::wait_passed(time_ns_t until_ns) const noexcept {
 // ---- what it makes of the architecture's table
 
 void TransactionCommit::Work::prepare_publication() {
-  is_structural_ = draft_->is_structural();
   resynchronises_ = draft_->resynchronise_step() != 0;
+  is_structural_ = draft_->is_structural() || resynchronises_;  // of all components that there are
   const bool is_plain = std::all_of(changes_.begin(), changes_.end(), [](const Change& change) {
     return change.parts == nullptr && change.retreat == nullptr && !change.draft->is_added;
   });
@@ -145,12 +146,13 @@ void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
   if (is_structural_) architecture_.swap_lists(lists_);
   for (auto& [component, wires] : wires_) component->swap_wires(wires);
   for (ServiceBase* service : services_) service->set_since_ns(instant_ns);
-  const bool has_claimed = draft_->forget_claims();
+  if (draft_->forget_claims()) {
+    for (const auto& component : draft_->claimed()) component->change_mark().release();
+  }
   for (const Element& element : elements_) {
     ChangeMark& mark = element.component->change_mark();
     if (!is_run_only_) mark.set_changed();
     if (element.has_place) mark.unsettle();
-    if (has_claimed) mark.release();
     mark.set_since_ns(instant_ns);
   }
   for (Component* component : added_) component->enter(architecture_);
@@ -306,7 +308,7 @@ bool TransactionCommit::Work::call_off_preparation() {
 bool TransactionCommit::Work::acts_on_present_parts() const noexcept {
   const auto& components = draft_->components();
   if (std::any_of(components.begin(), components.end(),
-                  [](const DraftComponent& component) { return component.promoted != nullptr; }))
+                  [](const DraftComponent& component) { return component.is_candidate_out; }))
     return true;
   const auto& claimed = draft_->claimed();
   const CommitGate::Look table(architecture_.commit_gate());

@@ -70,6 +70,10 @@ time_ns_t Participant::limit_ns() const noexcept {
   return declared == 0 ? kForever : later_by(declared, Commit::kPatience);
 }
 
+time_ns_t Participant::new_epoch_ns() const noexcept {
+  return epoch_lead_ns != 0 ? later_by(commit->instant_ns() - 1, epoch_lead_ns) : 0;
+}
+
 bool Commit::adopt(Participant& participant) noexcept {
   const Clock& clock = participant.task->clock();
   time_ns_t began = clock.now_ns();

@@ -227,7 +227,8 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
   if (!command_mutex_.try_lock_until(until))
     return throw_late("a commit or another command of the component lasts; it was not started", "try again");
   const LockGuard lock(command_mutex_, std::adopt_lock);
-  if (state() == ComponentState::stopped && !simulated_ && !wait_slot(until))
+  if (state() == ComponentState::stopped && !simulated_ && !wait_slot(until) &&
+      state() == ComponentState::stopped)  // a take that does not end makes it FAULTED
     throw_late("the component has yet to take an earlier change; it was not started", "try again");
   // A change posts a start and goes on: the thread may be taking it up, and reads what the next one would write.
   if (state() == ComponentState::stopped && !is_parked() && !wait_started(until))

@@ -219,6 +219,7 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   const bool has_timed_out = !machine_.end_execution();
   if (has_timed_out) await_time_out();
   const bool stops = was_started && participant.afterwards == Afterwards::stop;
+  if (stops || has_timed_out || !was_started) join_new_epoch(participant);
   if (was_parked && !has_timed_out) parked_.store(1, std::memory_order_seq_cst);
   if (was_started) trace_take(participant);
   if (has_timed_out) {
@@ -239,6 +240,11 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   return stops ? Visit::parks : Visit::goes_on;
 }
 
+/// Of a component that does not go on: it starts on the new epoch.
+void Task::join_new_epoch(const Participant& participant) noexcept {
+  if (const time_ns_t epoch_ns = participant.new_epoch_ns(); epoch_ns != 0) join(epoch_ns);
+}
+
 void Task::note_taken(const Commit& commit) noexcept {
   machine_.change_at(commit.instant_ns());
   taken_ns_.store(commit.instant_ns(), std::memory_order_relaxed);
@@ -257,12 +263,9 @@ void Task::pass(Participant& participant) noexcept {
 }
 
 void Task::go_on_with(Participant& participant, bool was_started) noexcept {
-  const time_ns_t epoch_ns = participant.epoch_lead_ns != 0
-                                 ? later_by(participant.commit->instant_ns() - 1, participant.epoch_lead_ns)
-                                 : 0;
+  const time_ns_t epoch_ns = participant.new_epoch_ns();
   const bool restarts = participant.afterwards == Afterwards::restart && !place_kept_;
   if (!was_started) {
-    if (epoch_ns != 0) join(epoch_ns);
     if (!restarts) return;
     if (!simulated_) counters_.mark();
     regain_priority();
@@ -336,6 +339,7 @@ bool Task::end_slot(Participant& participant) noexcept {
   participant.pending_ns = was_started ? due_ns() : 0;
   commit.take(participant);
   note_taken(commit);
+  join_new_epoch(participant);
   participant.armed_ns = participant.resumes_ns = machine_.look_at_clock();
   participant.released.store(Participant::kSuperseded,
                              std::memory_order_release);  // it parks, so none follows
@@ -362,7 +366,7 @@ void Task::take_parked(Participant& participant) noexcept {
   participant.parked_ns = clock().now_ns();
   commit.take(participant);
   note_taken(commit);
-  if (participant.epoch_lead_ns != 0) join(later_by(commit.instant_ns() - 1, participant.epoch_lead_ns));
+  join_new_epoch(participant);
   // A shutdown may have come before the commit held the task.
   const bool can_start = simulated_ || has_thread();
   if (can_start && participant.afterwards == Afterwards::restart) {

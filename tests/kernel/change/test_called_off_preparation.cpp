@@ -199,6 +199,39 @@ TEST_F(CalledOffPreparation, AnArchitectureThatEndsLeavesBehindWhatTheHookUses) 
   wait_until([&] { return has_returned->load(); }, "the end of the hook");
 }
 
+/// A new epoch is about all components.
+TEST_F(CalledOffPreparation, OfANewEpochHoldsNobodyAfterwards) {
+  deploy();
+  begin(std::move(
+      Transaction().replace_core("b", std::make_unique<LoggedCore>("slow", log, doors)).resynchronise()));
+  EXPECT_EQ(Abandoned::called_off, host().abandon("b"));
+  commit(Transaction().set_property("p", "gain", 2.0).resynchronise());
+  expect_called_off();
+}
+
+/// Once the hook has lasted for longer than the change allows, too.
+TEST_F(CalledOffPreparation, OfANewEpochEndsByItself) {
+  deploy();
+  begin(
+      std::move(
+          Transaction().replace_core("b", std::make_unique<LoggedCore>("slow", log, doors)).resynchronise()),
+      {.timeouts = {.prepare_ns = ms_to_ns(30)}});
+  commit(Transaction().set_property("p", "gain", 2.0));
+  expect_called_off();
+}
+
+/// The candidate is taken out of its shadow last.
+TEST_F(CalledOffPreparation, OfAPromoteBesideItIsCalledOffToo) {
+  deploy();
+  commit(Transaction().shadow("p", std::make_unique<TestCore>(), {.budget_ns = ms_to_ns(1)}));
+  begin(std::move(
+      Transaction().promote("p").replace_core("b", std::make_unique<LoggedCore>("slow", log, doors))));
+  EXPECT_EQ(Abandoned::called_off, host().abandon("b"));
+  ASSERT_EQ(1U, host().shadows().size());
+  EXPECT_EQ(ShadowVerdict::running, host().shadows().front().verdict);
+  expect_called_off();
+}
+
 TEST_F(CalledOffPreparation, WhatIsAddedIsFreeForOthers) {
   deploy();
   begin(std::move(Transaction()

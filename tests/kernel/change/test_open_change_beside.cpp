@@ -185,6 +185,30 @@ TEST_F(OpenChangeBeside, ACleanupThatHangsHoldsNobody) {
   doors->open = true;
 }
 
+/// Of a dry run and of a refused change, whose shadow does not begin.
+TEST_F(OpenChangeBeside, ACleanupOfAShadowThatHangsHoldsNobody) {
+  deploy();
+  for (const bool is_dry : {true, false}) {
+    const auto doors = std::make_shared<Doors>();
+    auto candidate = std::make_unique<HookedCore>();
+    candidate->cleaning = [doors] { doors->pass(); };
+    Transaction change;
+    change.shadow("b", std::move(candidate), {.budget_ns = ms_to_ns(1)});
+    if (!is_dry) change.replace_core("p", "t/Refusing");
+    auto asked =
+        std::async(std::launch::async, [&] { host().commit(std::move(change), {.dry_run = is_dry}); });
+    wait_until([&] { return doors->entered.load(); }, "the cleanup");
+    EXPECT_NO_THROW(commit(Transaction().set_property("b", "gain", 3.0), kShortly));
+    if (is_dry) {
+      EXPECT_NO_THROW(asked.get());
+    } else {
+      EXPECT_EQ(ErrorCode::adopt_refused, refusal([&] { asked.get(); }).code());
+    }
+    EXPECT_FALSE(doors->open) << "who asked is answered";
+    doors->open = true;
+  }
+}
+
 TEST_F(OpenChangeBeside, AStopByForceEndsAnAdoptThatHangs) {
   architecture.connect("b", "output", "r", "write");
   core(architecture.component("b")).work = [this] {

@@ -112,6 +112,21 @@ TYPED_TEST(Resynchronise, StoppedOnesAndThoseAddedTakeItWhenTheyStart) {
   EXPECT_EQ(0, seven.phase_error(stopped.task().get_time()));
 }
 
+/// The thread of the component takes both, and does not go on.
+TYPED_TEST(Resynchronise, OneThatTheSameChangeStopsTakesItToo) {
+  Component& first = this->add("first", 3);
+  Component& stopped = this->add("stopped", 7);
+  this->deploy();
+  this->wait_runs(first, 2);
+  this->wait_runs(stopped, 2);
+  Transaction transaction;
+  transaction.stop("stopped").resynchronise();
+  this->host.commit(std::move(transaction));
+  EXPECT_EQ(ComponentState::stopped, stopped.task().state());
+  EXPECT_EQ(this->epoch_ns(), stopped.task().grid().reference_ns);
+  EXPECT_EQ(this->epoch_ns(), first.task().grid().reference_ns);
+}
+
 TYPED_TEST(Resynchronise, BesideAnAddedComponentOneEpochServesAll) {
   Component& first = this->add("first", 3);
   this->deploy();

@@ -317,6 +317,8 @@ std::string alive() {
   return text;
 }
 
+const char* running() noexcept { return self().name.data(); }
+
 void write_trace(const std::string& path) {
   std::FILE* const file = std::fopen(path.c_str(), "w");
   if (file == nullptr) return;

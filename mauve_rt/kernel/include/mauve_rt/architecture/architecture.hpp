@@ -77,7 +77,7 @@ struct ArchitecturePresence {
 
 /// Each is claimed by one change at a time.
 struct ArchitectureClaims {
-  bool structure{false};  // to add or remove something, or wire ports
+  bool structure{false};  // to add or remove something, to wire ports, or to give all components a new epoch
   bool revision{false};  // to be the only change since the revision that it expects, of those that expect one
 };
 

@@ -109,6 +109,8 @@ struct Participant {
   /// How long its adopts, or its takes, may last before the watchdog gives the component up; kForever: the requester watches them,
   /// as long as its patience lasts. [rt]
   time_ns_t limit_ns() const MAUVE_RT;
+  /// Of a change that is made; 0: the epoch stays. [rt]
+  time_ns_t new_epoch_ns() const MAUVE_RT;
   /// Whether it has taken the change, and all of the above is there. [rt]
   bool has_passed() const MAUVE_RT { return passed.load(std::memory_order_acquire); }
   /// After it has passed: whether a release follows; none does in a wait that only a stop ends. [non-rt]

@@ -412,6 +412,7 @@ class Task final : public Waiter {
   bool make_safe(bool may_wait) MAUVE_RT;
   Shell* shell() const MAUVE_RT { return shell_.load(std::memory_order_acquire); }
   void note_taken(const Commit& commit) MAUVE_RT;
+  void join_new_epoch(const Participant& participant) MAUVE_RT;
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void watch_probation() noexcept;

@@ -66,6 +66,8 @@ void begin(const Options& options);
 Outcome outcome() noexcept;
 /// The threads that have not ended, each with what it waits for.
 std::string alive();
+/// Of the thread that runs, as the kernel named it.
+const char* running() noexcept;
 /// One line a call: instant, thread, call.
 void write_trace(const std::string& path);
 

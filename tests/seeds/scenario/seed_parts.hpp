@@ -1,0 +1,252 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The parts of a scenario's components: they note what is done with them, and behave badly where the seed wants it.
+#pragma once
+
+#include <array>
+#include <cstring>
+#include <map>
+#include <memory>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/base/seam/sleep.hpp"
+#include "mauve_rt/mauve_rt.hpp"
+
+#include "../forked_run.hpp"
+#include "dice.hpp"
+#include "fixtures.hpp"
+
+namespace mauve::testing {
+
+inline constexpr int kNone = -1;
+/// What the input of a component reads where it is not connected, or nothing was written yet.
+inline constexpr double kUnconnected = 7.0;
+/// What a component writes.
+constexpr double written_by(int component) { return 10.0 + component; }
+
+/// One execution of a core in its component, or in a shadow.
+struct Execution {
+  int component;
+  time_ns_t clock_ns;
+  time_ns_t at_ns;
+  int core;
+  double gain;
+  double input;        // what the component reads
+  std::int64_t count;  // executions that the core's state knows of
+  bool is_in_shadow;
+};
+
+/// What all parts of a run share. One thread runs at a time: nothing needs a lock.
+struct Shared {
+  explicit Shared(seeds::Findings& all) : findings(all) {}
+  seeds::Findings& findings;
+  std::vector<Execution> executions{};
+  bool hung_may_go_on{false};
+  bool is_shut_down{false};               // or about to be
+  std::map<int, std::string> cores{};     // alive
+  std::map<int, int> took_from{};         // whose state each core took over
+  std::map<int, time_ns_t> hung_cores{};  // in the release of which instant
+  std::set<int> hung_components{};
+  std::set<int> misbehaved{};  // components
+};
+
+/// Where a core behaves badly.
+enum class Hook : std::uint8_t { state, guard, configure, cleanup, adopt, take };
+inline constexpr std::array kHookNames{"state", "guard", "configure", "cleanup", "adopt", "take"};
+/// And how.
+enum class Deed : std::uint8_t { nothing, slow, throws, hangs, refuses };
+inline constexpr std::array kDeedNames{"good", "slow", "throwing", "hanging", "refusing"};
+
+struct Manner {
+  Hook hook{Hook::state};
+  Deed deed{Deed::nothing};
+  bool is_good() const noexcept { return deed == Deed::nothing; }
+  std::string name() const {
+    const std::string what = kDeedNames[static_cast<std::size_t>(deed)];
+    return is_good() ? what : what + " " + kHookNames[static_cast<std::size_t>(hook)];
+  }
+  static Manner any(Dice& dice) {
+    if (dice.once_in(2)) return {};
+    return {.hook = static_cast<Hook>(dice.below(kHookNames.size())),
+            .deed = static_cast<Deed>(1 + dice.below(kDeedNames.size() - 1))};
+  }
+};
+
+/// Notes each of its executions, and behaves badly after some.
+class SeedCore : public Core<TestShell> {
+ public:
+  SeedCore(std::shared_ptr<Shared> shared, int component, int number, Manner manner, std::uint64_t seed)
+      : shared_(std::move(shared)), component_(component), number_(number), manner_(manner), dice_(seed) {
+    shared_->cores[number] =
+        description() + " of component " + std::to_string(component) + ", " + manner.name();
+    set_implementation("seeds/Core" + std::to_string(number));
+  }
+  ~SeedCore() override {
+    shared_->cores.erase(number_);
+    expect(!is_ready_, "is destroyed before it is cleaned up");
+  }
+
+  // ---- the methods of the fsm
+
+  void act() {
+    expect(is_ready_, "executes and is not configured");
+    expect(!is_out_ || was_on_call_, "executes after another core took over from it");
+    is_out_ = false;
+    shared_->executions.push_back({.component = component_,
+                                   .clock_ns = clock_ns(),
+                                   .at_ns = seeds::now_ns(),
+                                   .core = number_,
+                                   .gain = shell().gain.value(),
+                                   .input = shell().input.read().value.value,
+                                   .count = ++count_,
+                                   .is_in_shadow = std::strcmp(seeds::running(), "shadow") == 0});
+    ++copied_;
+    expect(copied_ == count_, "has other state fields than take() moved over: " + std::to_string(copied_) +
+                                  " and " + std::to_string(count_));
+    shell().output.write(Number{written_by(component_)});
+    if (count_ > 3 && dice_.once_in(4)) behave(Hook::state);
+    compute(us_to_ns(60));
+  }
+  bool is_odd() {
+    if (dice_.once_in(8)) behave(Hook::guard);
+    return dice_.once_in(2);
+  }
+
+  // ---- the hooks
+
+  bool configure_hook() override {
+    expect(!is_ready_, "is configured twice");
+    const bool agrees = behave(Hook::configure);
+    is_ready_ = agrees;
+    return agrees;
+  }
+  void cleanup_hook() override {
+    expect(is_ready_, "is cleaned up and is not configured");
+    is_ready_ = false;
+    behave(Hook::cleanup);
+  }
+  bool adopt(const CoreBase& /*old*/) override {
+    expect(is_ready_, "adopts and is not configured");
+    compute(us_to_ns(20));
+    return behave(Hook::adopt);
+  }
+  void take(CoreBase& old) noexcept override {
+    auto& before = static_cast<SeedCore&>(old);
+    expect(before.component_ == component_, "takes the state of a core of another component");
+    expect(!shared_->took_from.contains(number_), "takes over twice");
+    count_ = before.count_;
+    shared_->took_from[number_] = before.number_;
+    before.is_out_ = true;
+    before.was_on_call_ = is_on_probation_;
+    behave(Hook::take);
+    compute(us_to_ns(20));
+  }
+  void set_on_probation() noexcept { is_on_probation_ = true; }
+  std::string description() const override { return "core " + std::to_string(number_); }
+
+ private:
+  void expect(bool is_true, const char* what) const {
+    if (!is_true)
+      shared_->findings.expect(false,
+                               description() + " of component " + std::to_string(component_) + " " + what);
+  }
+  void expect(bool is_true, const std::string& what) const { expect(is_true, what.c_str()); }
+
+  void compute(time_ns_t most_ns) noexcept {
+    const time_ns_t until_ns = monotonic_now_ns() + dice_.between(0, most_ns);
+    while (monotonic_now_ns() < until_ns) {
+    }
+  }
+  /// False: it refuses. Does nothing in other hooks than its own.
+  bool behave(Hook hook) {
+    if (hook != manner_.hook || manner_.is_good()) return true;
+    shared_->misbehaved.insert(component_);
+    const bool is_noexcept = hook == Hook::take;
+    const bool is_of_caller = shared_->is_shut_down && hook != Hook::state && hook != Hook::guard;
+    switch (manner_.deed) {
+      case Deed::nothing:
+        return true;
+      case Deed::throws:
+        if (is_noexcept) return true;
+        shared_->findings.count(manner_.name());
+        throw std::runtime_error("as the seed wants");
+      case Deed::hangs:
+        if (!is_of_caller)
+          hang();  // nothing runs any more: the hook is called by the thread that made the request
+        return true;
+      case Deed::refuses:
+        return false;
+      case Deed::slow:
+        shared_->findings.count(manner_.name());
+        if (hook == Hook::state || hook == Hook::guard) {
+          compute(us_to_ns(900));
+        } else {
+          sleep_for(dice_.between(us_to_ns(100), ms_to_ns(8)));
+        }
+    }
+    return true;
+  }
+  void hang() noexcept {
+    shared_->findings.count(manner_.name());
+    shared_->hung_cores.emplace(number_, clock_ns());
+    shared_->hung_components.insert(component_);
+    while (!shared_->hung_may_go_on) sleep_for(ms_to_ns(1));
+  }
+
+  std::shared_ptr<Shared> shared_;
+  int component_;
+  int number_;
+  Manner manner_;
+  Dice dice_;
+  std::int64_t count_{0};   // take() moves it over
+  std::int64_t copied_{0};  // the kernel copies it
+  bool is_ready_{false};
+  bool is_on_probation_{false};
+  bool is_out_{false};       // another core has taken over
+  bool was_on_call_{false};  // on probation: it may come back
+
+  MAUVE_STATE(copied_)
+};
+
+/// act -> wait(period_ms) -> act, or another state that acts, as the guard says.
+struct SeedFsm : Fsm<TestShell, SeedCore> {
+  void define() override {
+    State& run = execution("Run", "act", &SeedCore::act);
+    State& odd = execution("Odd", "act", &SeedCore::act);
+    State& pause = wait("Pause", ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    transition(pause, "is_odd", &SeedCore::is_odd, odd);
+    next(odd, pause);
+    next(pause, run);
+  }
+};
+
+/// The same with a bound, which a slow core exceeds.
+struct BoundedFsm : Fsm<TestShell, SeedCore> {
+  void define() override {
+    State& run = execution("Run", "act", &SeedCore::act, ms_to_ns(2));
+    State& pause = wait("Pause", ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+/// act -> wait for a write to what `input` reads -> act
+struct EventFsm : Fsm<TestShell, SeedCore> {
+  static constexpr time_ns_t kTimeout = ms_to_ns(30);
+  static constexpr time_ns_t kApart = us_to_ns(700);
+  void define() override {
+    State& run = execution("Run", "act", &SeedCore::act);
+    State& pause = wait_event("Pause", shell().input, kTimeout, kApart);
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+}  // namespace mauve::testing
