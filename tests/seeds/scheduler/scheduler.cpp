@@ -20,6 +20,9 @@
 
 namespace mauve::seeds {
 
+// Threads count it down, one at a time. Before begin(), and in the process of the test program, it has no end.
+constinit std::uint64_t atomics_left{UINT64_MAX};
+
 struct Thread {
   int number{0};
   std::array<char, 16> name{};
@@ -44,6 +47,7 @@ namespace {
 
 constexpr time_ns_t kFirstInstant = s_to_ns(1000);
 constexpr std::size_t kMostThreads = 512;
+constexpr time_ns_t kOfAnAtomicStep = 2;
 
 /// SplitMix64.
 class Random {
@@ -70,6 +74,7 @@ class Random {
 struct Weather {
   std::uint64_t cpus{1};            // so many of the most urgent threads may run
   std::uint64_t switch_once_in{8};  // calls
+  std::uint64_t atomic_once_in{0};  // steps of atomic operations, of which each has two
   time_ns_t cost_ns{400};           // of a call, at most
   time_ns_t lateness_ns{us_to_ns(50)};
   std::uint64_t stall_once_in{0};  // calls
@@ -80,6 +85,7 @@ struct Weather {
     Weather weather;
     weather.cpus = 1 + random.below(4);
     weather.switch_once_in = std::array<std::uint64_t, 4>{2, 5, 20, 100}[random.below(4)];
+    weather.atomic_once_in = std::array<std::uint64_t, 4>{0, 600, 60, 6}[random.below(4)];
     weather.cost_ns = std::array<time_ns_t, 3>{60, 400, 3'000}[random.below(3)];
     weather.lateness_ns = std::array{us_to_ns(1), us_to_ns(40), us_to_ns(300)}[random.below(3)];
     weather.stall_once_in = std::array<std::uint64_t, 3>{0, 50'000, 5'000}[random.below(3)];
@@ -103,6 +109,7 @@ struct Scheduler {
   Thread* running{nullptr};
   Thread* ending{nullptr};  // gives the baton away at its very end
   time_ns_t now_ns{kFirstInstant};
+  std::uint64_t atomics_paid{0};  // the countdown, when time last passed for it
   Outcome outcome{.hash = 0xcbf2'9ce4'8422'2325U};
   std::vector<Event> trace;
 };
@@ -114,6 +121,22 @@ Scheduler& all() noexcept {
 }
 
 constinit thread_local Thread* this_thread [[gnu::tls_model("initial-exec")]] = nullptr;
+
+/// Until the next switch at an atomic operation. Where there are none, time passes all the same: a thread may spin.
+void begin_countdown() noexcept {
+  Scheduler& s = all();
+  const std::uint64_t once_in = s.weather.atomic_once_in;
+  atomics_left = once_in == 0 ? 5'000 : 1 + s.random.below(2 * once_in - 1);
+  s.atomics_paid = atomics_left;
+}
+
+void pay_for_atomics(Thread& thread) noexcept {
+  Scheduler& s = all();
+  const time_ns_t cost_ns = static_cast<time_ns_t>(s.atomics_paid - atomics_left) * kOfAnAtomicStep;
+  s.atomics_paid = atomics_left;
+  s.now_ns += cost_ns;
+  thread.cpu_ns += cost_ns;
+}
 
 void note(const Thread& thread, Call call) noexcept {
   Scheduler& s = all();
@@ -251,6 +274,7 @@ struct AtTheEnd {
     step(Call::thread_end);
     thread->has_ended = true;
     wake_all(thread);
+    this_thread = nullptr;
     Thread& next = choose();
     all().ending = thread;
     pass_baton(next);
@@ -281,7 +305,7 @@ const char* to_string(Call call) noexcept {
   static constexpr std::array kNames{
       "begin",        "clock",        "sleep",       "yield",      "futex_wait",  "futex_wake", "futex_lock",
       "futex_unlock", "lock",         "try_lock",    "unlock",     "lock_shared", "cond_wait",  "cond_notify",
-      "barrier",      "thread_start", "thread_join", "thread_end", "signal_wait", "stall"};
+      "barrier",      "thread_start", "thread_join", "thread_end", "signal_wait", "stall",      "atomic"};
   return kNames[static_cast<std::size_t>(call)];
 }
 
@@ -295,6 +319,7 @@ void begin(const Options& options) {
   s.outcome.calls = 0;
   s.now_ns = kFirstInstant;
   main.ready_ns = 0;
+  begin_countdown();
   std::array<void*, 1> first{};
   backtrace(first.data(), 1);  // loads what it needs
   struct sigaction action{};
@@ -342,9 +367,27 @@ Thread& self() noexcept {
   return *(this_thread = main);
 }
 
+void check_limits() noexcept {
+  const Scheduler& s = all();
+  if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
+  if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
+}
+
+void switch_at_atomic() noexcept {
+  Thread& thread = self();
+  pay_for_atomics(thread);
+  thread.call = Call::atomic;
+  ++all().outcome.calls;
+  note(thread, Call::atomic);
+  check_limits();
+  begin_countdown();
+  reschedule();
+}
+
 void step(Call call) noexcept {
   Scheduler& s = all();
   Thread& thread = self();
+  pay_for_atomics(thread);
   thread.call = call;
   ++s.outcome.calls;
   note(thread, call);
@@ -357,14 +400,14 @@ void step(Call call) noexcept {
     s.now_ns += stall_ns;
     s.outcome.stalled_ns += stall_ns;
   }
-  if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
-  if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
+  check_limits();
   if (s.random.once_in(s.weather.switch_once_in) || is_preempted(thread)) reschedule();
 }
 
 bool block(Call call, const void* address, time_ns_t until_ns, bool by_chance) noexcept {
   Scheduler& s = all();
   Thread& thread = self();
+  pay_for_atomics(thread);
   thread.call = call;
   thread.address = address;
   thread.is_woken = false;
@@ -500,24 +543,24 @@ namespace mauve {
 
 using seeds::Call;
 
-bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
+bool futex_wait_until(const Atomic<std::uint32_t>& word, std::uint32_t expected,
                       time_ns_t until_ns) noexcept {
   seeds::step(Call::futex_wait);
-  if (word.load(std::memory_order_relaxed) != expected) return true;
+  if (word.system().load() != expected) return true;
   return seeds::block(Call::futex_wait, &word, until_ns, true);
 }
 
-void futex_wake_all(const std::atomic<std::uint32_t>& word) noexcept {
+void futex_wake_all(const Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_wake);
   seeds::wake_all(&word);
 }
 
-bool futex_lock_pi(std::atomic<std::uint32_t>& word) noexcept {
+bool futex_lock_pi(Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_lock);
   seeds::Thread& self = seeds::self();
-  const std::uint32_t found = word.load(std::memory_order_relaxed);
+  const std::uint32_t found = word.system().load();
   if ((found & kFutexHolder) == 0) {
-    word.store(self.id, std::memory_order_relaxed);
+    word.system().store(self.id);
     return true;
   }
   const seeds::Thread* holder = nullptr;
@@ -525,7 +568,7 @@ bool futex_lock_pi(std::atomic<std::uint32_t>& word) noexcept {
     if (!thread->has_ended && thread->id == (found & kFutexHolder)) holder = thread;
   }
   if (holder == nullptr || holder == &self) return false;
-  word.store(found | FUTEX_WAITERS, std::memory_order_relaxed);
+  word.system().store(found | FUTEX_WAITERS);
   self.is_granted = false;
   self.inherits = holder;
   while (!self.is_granted) seeds::block(Call::futex_lock, &word, kForever, false);
@@ -534,10 +577,10 @@ bool futex_lock_pi(std::atomic<std::uint32_t>& word) noexcept {
 }
 
 /// To the most urgent waiter.
-bool futex_unlock_pi(std::atomic<std::uint32_t>& word) noexcept {
+bool futex_unlock_pi(Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_unlock);
   const seeds::Thread& self = seeds::self();
-  if ((word.load(std::memory_order_relaxed) & kFutexHolder) != self.id) return false;
+  if ((word.system().load() & kFutexHolder) != self.id) return false;
   seeds::Thread* next = nullptr;
   std::uint32_t waiting = 0;
   for (seeds::Thread* thread : seeds::all().threads) {
@@ -546,10 +589,10 @@ bool futex_unlock_pi(std::atomic<std::uint32_t>& word) noexcept {
     if (next == nullptr || seeds::urgency(*thread) > seeds::urgency(*next)) next = thread;
   }
   if (next == nullptr) {
-    word.store(0, std::memory_order_relaxed);
+    word.system().store(0);
     return true;
   }
-  word.store(next->id | (waiting > 1 ? FUTEX_WAITERS : 0), std::memory_order_relaxed);
+  word.system().store(next->id | (waiting > 1 ? FUTEX_WAITERS : 0));
   for (seeds::Thread* thread : seeds::all().threads) {
     if (thread->address == &word) thread->inherits = thread != next ? next : nullptr;
   }

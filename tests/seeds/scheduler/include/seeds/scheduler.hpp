@@ -11,14 +11,13 @@
 #include "mauve_rt/base/seam/clocks.hpp"
 
 /// Each thread is a thread of the system that waits for the baton on a semaphore of its own; the holder of the baton runs.
-/// The baton changes hands inside calls of the seam alone. The seed decides who is next, what a call costs in virtual time, how
+/// The baton changes hands inside calls of the seam and at atomic operations (Atomic). The seed decides who is next, what a call costs in virtual time, how
 /// late a sleeper wakes, and when the whole computer stalls. Nothing depends on an address, on a hash or on the real clock.
 ///
-/// A thread that waits for another one by no call of the seam would keep the baton for ever: no atomic operation is a possible
-/// switch so far.
+/// A thread that waits for another one by neither would keep the baton for ever.
 namespace mauve::seeds {
 
-/// A call of the seam, as the trace has it.
+/// A call of the seam, as the trace has it; an atomic operation only where threads may have switched.
 enum class Call : std::uint8_t {
   begin,
   clock,
@@ -40,6 +39,7 @@ enum class Call : std::uint8_t {
   thread_end,
   signal_wait,
   stall,
+  atomic,
 };
 const char* to_string(Call call) noexcept;
 
