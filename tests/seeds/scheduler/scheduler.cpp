@@ -52,7 +52,7 @@ constexpr time_ns_t kOfAnAtomicStep = 2;
 /// SplitMix64.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
+  explicit constexpr Random(std::uint64_t seed) : state_(seed) {}
   std::uint64_t next() noexcept {
     state_ += 0x9e37'79b9'7f4a'7c15U;
     std::uint64_t mixed = state_;
@@ -60,7 +60,8 @@ class Random {
     mixed = (mixed ^ (mixed >> 27U)) * 0x94d0'49bb'1331'11ebU;
     return mixed ^ (mixed >> 31U);
   }
-  std::uint64_t below(std::uint64_t bound) noexcept { return next() % bound; }
+  /// `bound`: below 2^32. By a product, as a division takes ten times as long.
+  std::uint64_t below(std::uint64_t bound) noexcept { return ((next() >> 32U) * bound) >> 32U; }
   time_ns_t up_to(time_ns_t longest_ns) noexcept {
     return static_cast<time_ns_t>(below(static_cast<std::uint64_t>(longest_ns) + 1));
   }
@@ -105,20 +106,27 @@ struct Scheduler {
   Options options;
   Random random{0};
   Weather weather;
-  std::vector<Thread*> threads;
+  std::vector<Thread*> threads;  // by number
+  std::vector<Thread*> alive;    // those that have not ended, in the order of their numbers
+  std::uint64_t inheriting{0};   // of those, wait for a thread that inherits their priority
   Thread* running{nullptr};
   Thread* ending{nullptr};  // gives the baton away at its very end
   time_ns_t now_ns{kFirstInstant};
+  time_ns_t calm_until_ns{0};     // before that instant no other thread preempts the running one
   std::uint64_t atomics_paid{0};  // the countdown, when time last passed for it
   Outcome outcome{.hash = 0xcbf2'9ce4'8422'2325U};
   std::vector<Event> trace;
 };
 
 /// Never destroyed: threads may use it to the end of the process.
-Scheduler& all() noexcept {
-  static auto* const scheduler = new Scheduler;
-  return *scheduler;
-}
+union NeverDestroyed {
+  constexpr NeverDestroyed() noexcept : scheduler{} {}
+  ~NeverDestroyed() {}
+  Scheduler scheduler;
+};
+constinit NeverDestroyed never_destroyed;
+
+Scheduler& all() noexcept { return never_destroyed.scheduler; }
 
 constinit thread_local Thread* this_thread [[gnu::tls_model("initial-exec")]] = nullptr;
 
@@ -151,15 +159,22 @@ void note(const Thread& thread, Call call) noexcept {
 /// With what it inherits.
 int urgency(const Thread& thread, int depth = 0) noexcept {
   int highest = thread.priority;
-  if (depth > 8) return highest;
-  for (const Thread* other : all().threads) {
-    if (other->inherits == &thread && !other->has_ended)
-      highest = std::max(highest, urgency(*other, depth + 1));
+  if (all().inheriting == 0 || depth > 8) return highest;
+  for (const Thread* other : all().alive) {
+    if (other->inherits == &thread) highest = std::max(highest, urgency(*other, depth + 1));
   }
   return highest;
 }
 
-bool can_run(const Thread& thread) noexcept { return !thread.has_ended && thread.ready_ns <= all().now_ns; }
+void let_inherit(Thread& thread, const Thread* heir) noexcept {
+  Scheduler& s = all();
+  if (thread.inherits != nullptr) --s.inheriting;
+  if (heir != nullptr) ++s.inheriting;
+  thread.inherits = heir;
+  s.calm_until_ns = 0;
+}
+
+bool can_run(const Thread& thread) noexcept { return thread.ready_ns <= all().now_ns; }
 
 void await_baton(Thread& thread) noexcept {
   while (sem_wait(&thread.baton) != 0) {
@@ -190,24 +205,25 @@ std::string describe(const Thread& thread) {
 /// Passes time until somebody can run; who is next.
 Thread& choose() noexcept {
   Scheduler& s = all();
-  std::array<Thread*, kMostThreads> able{};
-  std::array<int, kMostThreads> urgencies{};
+  std::array<Thread*, kMostThreads> able;  // not initialized: that would take most of the time
+  std::array<int, kMostThreads> urgencies;
   for (;;) {
     std::size_t count = 0;
     time_ns_t earliest_ns = kForever;
-    for (Thread* thread : s.threads) {
+    for (Thread* thread : s.alive) {
       if (can_run(*thread)) {
         urgencies[count] = urgency(*thread);
         able[count++] = thread;
-      } else if (!thread->has_ended) {
+      } else {
         earliest_ns = std::min(earliest_ns, thread->ready_ns);
       }
     }
     if (count == 0) {
       if (earliest_ns == kForever) fail("deadlock: each thread waits to be woken");
-      s.now_ns = std::max(s.now_ns, earliest_ns);
+      s.now_ns = earliest_ns;
       continue;
     }
+    s.calm_until_ns = earliest_ns;
     // So many of the most urgent ones run at once on that many processors; any of these may be the next to come to a call.
     const std::size_t wanted = s.random.below(std::min<std::uint64_t>(s.weather.cpus, count));
     for (std::size_t i = 0; i <= wanted; ++i) {
@@ -235,14 +251,23 @@ void reschedule() noexcept {
   await_baton(before);
 }
 
-/// Whether more threads than there are processors are more urgent.
+/// Whether at least as many threads as there are processors are more urgent.
 bool is_preempted(const Thread& thread) noexcept {
+  Scheduler& s = all();
+  if (s.now_ns < s.calm_until_ns) return false;
   std::uint64_t more_urgent = 0;
+  time_ns_t earliest_ns = kForever;
   const int own = urgency(thread);
-  for (const Thread* other : all().threads) {
-    if (other != &thread && can_run(*other) && urgency(*other) > own) ++more_urgent;
+  for (const Thread* other : s.alive) {
+    if (!can_run(*other)) {
+      earliest_ns = std::min(earliest_ns, other->ready_ns);
+    } else if (other != &thread && urgency(*other) > own) {
+      ++more_urgent;
+    }
   }
-  return more_urgent >= all().weather.cpus;
+  if (more_urgent >= s.weather.cpus) return true;
+  s.calm_until_ns = earliest_ns;
+  return false;
 }
 
 time_ns_t lateness_ns() noexcept {
@@ -264,6 +289,7 @@ void wake(Thread& thread) noexcept {
   thread.is_woken = true;
   thread.address = nullptr;
   thread.ready_ns = std::min(thread.ready_ns, all().now_ns + lateness_ns());
+  all().calm_until_ns = 0;
 }
 
 /// The last that a thread does: its thread-local objects are gone by then.
@@ -273,6 +299,7 @@ struct AtTheEnd {
   ~AtTheEnd() {
     step(Call::thread_end);
     thread->has_ended = true;
+    std::erase(all().alive, thread);
     wake_all(thread);
     this_thread = nullptr;
     Thread& next = choose();
@@ -330,15 +357,13 @@ void begin(const Options& options) {
 Outcome outcome() noexcept {
   Outcome outcome = all().outcome;
   outcome.passed_ns = all().now_ns - kFirstInstant;
-  for (const Thread* thread : all().threads) outcome.alive += thread->has_ended ? 0 : 1;
+  outcome.alive = static_cast<int>(all().alive.size());
   return outcome;
 }
 
 std::string alive() {
   std::string text;
-  for (const Thread* thread : all().threads) {
-    if (!thread->has_ended) text += describe(*thread) + "\n";
-  }
+  for (const Thread* thread : all().alive) text += describe(*thread) + "\n";
   return text;
 }
 
@@ -362,7 +387,9 @@ Thread& self() noexcept {
   main->handle = pthread_self();
   sem_init(&main->baton, 0, 0);
   s.threads.reserve(kMostThreads);
+  s.alive.reserve(kMostThreads);
   s.threads.push_back(main);
+  s.alive.push_back(main);
   s.running = main;
   return *(this_thread = main);
 }
@@ -427,17 +454,16 @@ bool block(Call call, const void* address, time_ns_t until_ns, bool by_chance) n
 }
 
 void wake_all(const void* address) noexcept {
-  for (Thread* thread : all().threads) {
-    if (thread->address == address && !thread->has_ended && address != nullptr) wake(*thread);
+  for (Thread* thread : all().alive) {
+    if (thread->address == address) wake(*thread);
   }
 }
 
 void wake_one(const void* address) noexcept {
   Thread* chosen = nullptr;
   std::uint64_t waiting = 0;
-  for (Thread* thread : all().threads) {
-    if (thread->address == address && !thread->has_ended && all().random.below(++waiting) == 0)
-      chosen = thread;
+  for (Thread* thread : all().alive) {
+    if (thread->address == address && all().random.below(++waiting) == 0) chosen = thread;
   }
   if (chosen != nullptr) wake(*chosen);
 }
@@ -464,6 +490,8 @@ Thread* start(const NewThread& made, int& error) {
   if (error != 0) return nullptr;
   thread->ready_ns = s.now_ns + lateness_ns();
   s.threads.push_back(thread);
+  s.alive.push_back(thread);
+  s.calm_until_ns = 0;
   step(Call::thread_start);
   return thread;
 }
@@ -495,9 +523,9 @@ bool Lock::lock_until(time_ns_t until_ns) noexcept {
   Thread& thread = self();
   while (!take()) {
     if (holder_ == &thread) return false;
-    if (inherits_) thread.inherits = holder_;
+    if (inherits_) let_inherit(thread, holder_);
     const bool is_woken = block(Call::lock, this, until_ns, false);
-    thread.inherits = nullptr;
+    if (inherits_) let_inherit(thread, nullptr);
     if (!is_woken) return take();
   }
   return true;
@@ -507,8 +535,10 @@ void Lock::release() noexcept {
   if (holder_ != &self()) fail("a thread unlocks a lock that it does not hold");
   if (--depth_ > 0) return;
   holder_ = nullptr;
-  for (Thread* thread : all().threads) {
-    if (thread->address == this) thread->inherits = nullptr;
+  if (inherits_) {
+    for (Thread* thread : all().alive) {
+      if (thread->address == this) let_inherit(*thread, nullptr);
+    }
   }
   wake_all(this);
 }
@@ -524,12 +554,9 @@ void fail(const std::string& what) noexcept {
   Scheduler& s = all();
   std::string text = "seed " + std::to_string(s.options.seed) + ", after " +
                      std::to_string((s.now_ns - kFirstInstant) / 1000) + " us: " + what + "\n";
-  for (const Thread* thread : s.threads) {
-    if (!thread->has_ended) text += describe(*thread) + "\n";
-  }
+  text += alive();
   std::fputs(text.c_str(), stderr);
-  for (const Thread* thread : s.threads) {
-    if (thread->has_ended) continue;
+  for (const Thread* thread : s.alive) {
     std::fprintf(stderr, "-- thread %d '%s'\n", thread->number, thread->name.data());
     pthread_kill(thread->handle, SIGUSR2);
     usleep(20'000);
@@ -564,15 +591,15 @@ bool futex_lock_pi(Atomic<std::uint32_t>& word) noexcept {
     return true;
   }
   const seeds::Thread* holder = nullptr;
-  for (const seeds::Thread* thread : seeds::all().threads) {
-    if (!thread->has_ended && thread->id == (found & kFutexHolder)) holder = thread;
+  for (const seeds::Thread* thread : seeds::all().alive) {
+    if (thread->id == (found & kFutexHolder)) holder = thread;
   }
   if (holder == nullptr || holder == &self) return false;
   word.system().store(found | FUTEX_WAITERS);
   self.is_granted = false;
-  self.inherits = holder;
+  seeds::let_inherit(self, holder);
   while (!self.is_granted) seeds::block(Call::futex_lock, &word, kForever, false);
-  self.inherits = nullptr;
+  seeds::let_inherit(self, nullptr);
   return true;
 }
 
@@ -583,8 +610,8 @@ bool futex_unlock_pi(Atomic<std::uint32_t>& word) noexcept {
   if ((word.system().load() & kFutexHolder) != self.id) return false;
   seeds::Thread* next = nullptr;
   std::uint32_t waiting = 0;
-  for (seeds::Thread* thread : seeds::all().threads) {
-    if (thread->address != &word || thread->has_ended) continue;
+  for (seeds::Thread* thread : seeds::all().alive) {
+    if (thread->address != &word) continue;
     ++waiting;
     if (next == nullptr || seeds::urgency(*thread) > seeds::urgency(*next)) next = thread;
   }
@@ -593,8 +620,8 @@ bool futex_unlock_pi(Atomic<std::uint32_t>& word) noexcept {
     return true;
   }
   word.system().store(next->id | (waiting > 1 ? FUTEX_WAITERS : 0));
-  for (seeds::Thread* thread : seeds::all().threads) {
-    if (thread->address == &word) thread->inherits = thread != next ? next : nullptr;
+  for (seeds::Thread* thread : seeds::all().alive) {
+    if (thread->address == &word) seeds::let_inherit(*thread, thread != next ? next : nullptr);
   }
   next->is_granted = true;
   seeds::wake(*next);
@@ -605,9 +632,10 @@ bool futex_unlock_pi(Atomic<std::uint32_t>& word) noexcept {
 
 /// The kernel demotes threads by this function of the system; it finds this one first.
 extern "C" int pthread_setschedparam(pthread_t handle, int policy, const sched_param* parameters) noexcept {
-  for (mauve::seeds::Thread* thread : mauve::seeds::all().threads) {
-    if (thread->has_ended || pthread_equal(thread->handle, handle) == 0) continue;
+  for (mauve::seeds::Thread* thread : mauve::seeds::all().alive) {
+    if (pthread_equal(thread->handle, handle) == 0) continue;
     thread->priority = policy == SCHED_FIFO ? parameters->sched_priority : 0;
+    mauve::seeds::all().calm_until_ns = 0;
     return 0;
   }
   return ESRCH;
