@@ -138,14 +138,6 @@ void begin_countdown() noexcept {
   s.atomics_paid = atomics_left;
 }
 
-void pay_for_atomics(Thread& thread) noexcept {
-  Scheduler& s = all();
-  const time_ns_t cost_ns = static_cast<time_ns_t>(s.atomics_paid - atomics_left) * kOfAnAtomicStep;
-  s.atomics_paid = atomics_left;
-  s.now_ns += cost_ns;
-  thread.cpu_ns += cost_ns;
-}
-
 void note(const Thread& thread, Call call) noexcept {
   Scheduler& s = all();
   const std::uint64_t fact = static_cast<std::uint64_t>(s.now_ns) * 0x9e37'79b9'7f4a'7c15U +
@@ -292,6 +284,41 @@ void wake(Thread& thread) noexcept {
   all().calm_until_ns = 0;
 }
 
+void check_limits() noexcept {
+  const Scheduler& s = all();
+  if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
+  if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
+}
+
+/// A call begins, or an atomic operation that may be a switch: the time that passed is paid.
+void enter(Thread& thread, Call call) noexcept {
+  Scheduler& s = all();
+  const time_ns_t cost_ns = static_cast<time_ns_t>(s.atomics_paid - atomics_left) * kOfAnAtomicStep;
+  s.atomics_paid = atomics_left;
+  s.now_ns += cost_ns;
+  thread.cpu_ns += cost_ns;
+  thread.call = call;
+  ++s.outcome.calls;
+  note(thread, call);
+  check_limits();
+}
+
+/// It costs up to that time.
+void step(Thread& thread, Call call, time_ns_t longest_ns) noexcept {
+  Scheduler& s = all();
+  enter(thread, call);
+  const time_ns_t cost_ns = 20 + s.random.up_to(longest_ns);
+  s.now_ns += cost_ns;
+  thread.cpu_ns += cost_ns;
+  if (s.random.once_in(s.weather.stall_once_in)) {
+    note(thread, Call::stall);
+    const time_ns_t stall_ns = s.random.up_to(s.weather.stall_ns);
+    s.now_ns += stall_ns;
+    s.outcome.stalled_ns += stall_ns;
+  }
+  if (s.random.once_in(s.weather.switch_once_in) || is_preempted(thread)) reschedule();
+}
+
 /// The last that a thread does: its thread-local objects are gone by then.
 struct AtTheEnd {
   Thread* thread;
@@ -330,9 +357,10 @@ void print_stack(int /*signal*/) {
 
 const char* to_string(Call call) noexcept {
   static constexpr std::array kNames{
-      "begin",        "clock",        "sleep",       "yield",      "futex_wait",  "futex_wake", "futex_lock",
-      "futex_unlock", "lock",         "try_lock",    "unlock",     "lock_shared", "cond_wait",  "cond_notify",
-      "barrier",      "thread_start", "thread_join", "thread_end", "signal_wait", "stall",      "atomic"};
+      "begin",       "clock",        "sleep",   "yield",        "futex_wait",  "futex_wake",
+      "futex_lock",  "futex_unlock", "lock",    "try_lock",     "unlock",      "lock_shared",
+      "cond_wait",   "cond_notify",  "barrier", "thread_start", "thread_join", "thread_end",
+      "signal_wait", "stall",        "atomic",  "compute"};
   return kNames[static_cast<std::size_t>(call)];
 }
 
@@ -394,47 +422,24 @@ Thread& self() noexcept {
   return *(this_thread = main);
 }
 
-void check_limits() noexcept {
-  const Scheduler& s = all();
-  if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
-  if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
-}
-
 void switch_at_atomic() noexcept {
-  Thread& thread = self();
-  pay_for_atomics(thread);
-  thread.call = Call::atomic;
-  ++all().outcome.calls;
-  note(thread, Call::atomic);
-  check_limits();
+  enter(self(), Call::atomic);
   begin_countdown();
   reschedule();
 }
 
-void step(Call call) noexcept {
-  Scheduler& s = all();
+void step(Call call) noexcept { step(self(), call, all().weather.cost_ns); }
+
+void compute(time_ns_t length_ns) noexcept {
+  constexpr time_ns_t kSlice = us_to_ns(10);
   Thread& thread = self();
-  pay_for_atomics(thread);
-  thread.call = call;
-  ++s.outcome.calls;
-  note(thread, call);
-  const time_ns_t cost_ns = 20 + s.random.up_to(s.weather.cost_ns);
-  s.now_ns += cost_ns;
-  thread.cpu_ns += cost_ns;
-  if (s.random.once_in(s.weather.stall_once_in)) {
-    note(thread, Call::stall);
-    const time_ns_t stall_ns = s.random.up_to(s.weather.stall_ns);
-    s.now_ns += stall_ns;
-    s.outcome.stalled_ns += stall_ns;
-  }
-  check_limits();
-  if (s.random.once_in(s.weather.switch_once_in) || is_preempted(thread)) reschedule();
+  const time_ns_t until_ns = thread.cpu_ns + length_ns;
+  while (thread.cpu_ns < until_ns) step(thread, Call::compute, std::min(kSlice, until_ns - thread.cpu_ns));
 }
 
 bool block(Call call, const void* address, time_ns_t until_ns, bool by_chance) noexcept {
   Scheduler& s = all();
   Thread& thread = self();
-  pay_for_atomics(thread);
   thread.call = call;
   thread.address = address;
   thread.is_woken = false;

@@ -40,6 +40,7 @@ enum class Call : std::uint8_t {
   signal_wait,
   stall,
   atomic,
+  compute,
 };
 const char* to_string(Call call) noexcept;
 
@@ -68,6 +69,9 @@ Outcome outcome() noexcept;
 std::string alive();
 /// One line a call: instant, thread, call.
 void write_trace(const std::string& path);
+
+/// The calling thread uses the processor for so long: for a scenario, which would loop over many readings of a clock otherwise.
+void compute(time_ns_t length_ns) noexcept;
 
 // ---- for the seam
 
