@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <stdexcept>
 #include <vector>
 
 #include "mauve_rt/base/seam/futex.hpp"
@@ -364,6 +365,15 @@ const char* to_string(Call call) noexcept {
   return kNames[static_cast<std::size_t>(call)];
 }
 
+void prepare_forks() noexcept {
+  std::array<void*, 1> first{};
+  backtrace(first.data(), 1);
+  try {
+    throw std::runtime_error("prepared");
+  } catch (const std::runtime_error&) {  // thrown to be caught
+  }
+}
+
 void begin(const Options& options) {
   Scheduler& s = all();
   Thread& main = self();
@@ -375,8 +385,6 @@ void begin(const Options& options) {
   s.now_ns = kFirstInstant;
   main.ready_ns = 0;
   begin_countdown();
-  std::array<void*, 1> first{};
-  backtrace(first.data(), 1);  // loads what it needs
   struct sigaction action{};
   action.sa_handler = &print_stack;
   sigaction(SIGUSR2, &action, nullptr);

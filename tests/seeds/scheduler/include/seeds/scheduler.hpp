@@ -62,6 +62,8 @@ struct Outcome {
   bool operator==(const Outcome&) const = default;
 };
 
+/// What the first stack trace and the first exception of a process load is loaded here, not in each forked process.
+void prepare_forks() noexcept;
 /// Begins a run, with the calling thread as the first one. Once in a process, before the seam makes any thread.
 void begin(const Options& options);
 Outcome outcome() noexcept;
