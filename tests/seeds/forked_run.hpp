@@ -67,6 +67,8 @@ struct Run {
 template <typename Scenario>
 Run run_forked(const Scenario& scenario, std::uint64_t seed, const std::string& trace = {}) {
   constexpr unsigned kLongestSeconds = 120;  // of the real clock: the child spins without a call of the seam
+  static const bool is_prepared = (prepare_forks(), true);
+  static_cast<void>(is_prepared);
   int ends[2];
   if (pipe(ends) != 0) return {.status = -1, .text = "no pipe"};
   const pid_t child = fork();

@@ -49,7 +49,11 @@ Architecture::~Architecture() {
   // A fallback core whose configure hangs uses shell, fsm and resources of its component.
   const bool have_ended = end_threads() && presence_->renewals.load(std::memory_order_acquire) == 0;
   std::erase_if(open_, [](const auto& change) { return change->settle(); });
-  if (!have_ended || !open_.empty()) {
+  // The thread of a change that was called off finds no architecture any more, and frees no parts from here on: a hook of that
+  // change may still use them, and check_cleanup() would throw.
+  const bool are_held = std::any_of(lists_.components.begin(), lists_.components.end(),
+                                    [this](const auto& component) { return are_parts_held(*component); });
+  if (!have_ended || are_held || !open_.empty()) {
     // A thread that does not come back from user code is left behind with all it may use: nothing of that is freed.
     for (const auto& resource : lists_.resources) resource->set_notifier(nullptr);
     keep_for_ever(std::move(lists_.resources));

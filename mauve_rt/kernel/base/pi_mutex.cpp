@@ -13,9 +13,8 @@ namespace {
 
 /// What a lock needs of its thread, in static thread-local storage: no call to find it.
 struct ThisThread {
-  std::int32_t id{0};  // 0: not asked for yet
-  std::atomic<int> held{
-      0};  // relaxed: written by its thread alone; others ask whether it may hold one at all
+  std::int32_t id{0};   // 0: not asked for yet
+  Atomic<int> held{0};  // relaxed: written by its thread alone; others ask whether it may hold one at all
   bool misused{false};
   PiMutex* last{nullptr};  // locked, of those held
 };
@@ -114,6 +113,6 @@ bool PiMutex::was_misused_by_this_thread() noexcept { return std::exchange(this_
 
 int PiMutex::held_by_this_thread() noexcept { return this_thread().held.load(std::memory_order_relaxed); }
 
-const std::atomic<int>& PiMutex::count_of_this_thread() noexcept { return this_thread().held; }
+const Atomic<int>& PiMutex::count_of_this_thread() noexcept { return this_thread().held; }
 
 }  // namespace mauve

@@ -19,7 +19,7 @@ constinit const MonotonicClock the_monotonic_clock{};  // there before anybody a
 
 time_ns_t MonotonicClock::now_ns() const noexcept { return monotonic_now_ns(); }
 
-bool MonotonicClock::sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
+bool MonotonicClock::sleep_until(time_ns_t instant_ns, const Atomic<std::uint32_t>& word,
                                  std::uint32_t expected) const noexcept {
   // acquire: what the waker wrote before it changed the word is visible to who returns
   while (word.load(std::memory_order_acquire) == expected) {

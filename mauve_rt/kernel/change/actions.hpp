@@ -162,7 +162,7 @@ class ListenerChange final : public CommitAction, public EventListener {
   Resource& resource_;
   std::shared_ptr<const void> use_;
   EventInput& input_;
-  std::atomic<bool> live_{false};
+  Atomic<bool> live_{false};
 };
 
 /// Forgets a fault: the component is STOPPED then, with new parts or parts configured anew.

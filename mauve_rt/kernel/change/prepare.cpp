@@ -132,11 +132,9 @@ void TransactionCommit::Work::end_left_behind(ArchitecturePresence& presence) {
 
 void TransactionCommit::Work::prepare_interruptibly() {
   struct Preparing {
-    explicit Preparing(std::atomic<bool>& is_so) : value(is_so) {
-      value.store(true, std::memory_order_relaxed);
-    }
+    explicit Preparing(Atomic<bool>& is_so) : value(is_so) { value.store(true, std::memory_order_relaxed); }
     ~Preparing() { value.store(false, std::memory_order_relaxed); }
-    std::atomic<bool>& value;
+    Atomic<bool>& value;
   };
   const Preparing preparing(is_preparing_);
   prepare();

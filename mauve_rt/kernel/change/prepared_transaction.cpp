@@ -4,13 +4,13 @@
 #include <malloc.h>
 
 #include <algorithm>
-#include <atomic>
 #include <exception>
 #include <optional>
 
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 
 #include "change/work.hpp"
@@ -138,11 +138,11 @@ class PreparedTransaction::State {
   UrgentCommit urgent{};
 
   enum Phase : std::uint8_t { kReady, kCommitting, kCommitted, kNotMade, kSettled };
-  std::atomic<bool> used{false};
-  std::atomic<Phase> phase{kReady};
-  std::atomic<PreparedOutcome> outcome{PreparedOutcome::stale};
-  std::atomic<bool> is_dropped{false};
-  std::atomic<bool> is_called_off{false};
+  Atomic<bool> used{false};
+  Atomic<Phase> phase{kReady};
+  Atomic<PreparedOutcome> outcome{PreparedOutcome::stale};
+  Atomic<bool> is_dropped{false};
+  Atomic<bool> is_called_off{false};
   std::exception_ptr failure{};  // why it was not made; or what went wrong in the retirement of one that was
 };
 

@@ -2,12 +2,12 @@
 // The work of one transaction, from its draft to its report.
 #pragma once
 
-#include <atomic>
 #include <map>
 #include <memory>
 #include <optional>
 #include <vector>
 
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/condition_variable.hpp"
 #include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
@@ -205,11 +205,11 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
       actions_;  // in the order they are taken in; the new parts come after
   StateGuard guard_;
   std::vector<std::string> step_texts_;
-  std::atomic<std::thread::id> thread_{std::this_thread::get_id()};  // that prepares
-  std::atomic<time_ns_t> begun_ns_{0};
-  std::atomic<bool> is_armed_{false};       // prepared, and not being committed
-  std::atomic<bool> is_preparing_{false};   // beside other changes: each hook that it is at can be called off
-  std::atomic<bool> is_called_off_{false};  // the claims are free, and the parts of its components are held
+  Atomic<std::thread::id> thread_{std::this_thread::get_id()};  // that prepares
+  Atomic<time_ns_t> begun_ns_{0};
+  Atomic<bool> is_armed_{false};       // prepared, and not being committed
+  Atomic<bool> is_preparing_{false};   // beside other changes: each hook that it is at can be called off
+  Atomic<bool> is_called_off_{false};  // the claims are free, and the parts of its components are held
   struct Preparation {
     Mutex mutex;
     ConditionVariable changed;
@@ -225,8 +225,8 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component
   bool committed_{false};
-  std::atomic<Phase> phase_{Phase::being_made};
-  std::atomic<bool> is_noted_{false};
+  Atomic<Phase> phase_{Phase::being_made};
+  Atomic<bool> is_noted_{false};
   std::exception_ptr failure_{};  // of its retirement
   bool resynchronises_{false};
 

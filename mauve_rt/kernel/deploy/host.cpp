@@ -172,7 +172,7 @@ TraceDrain Host::drain_trace() {
 }
 
 std::uint32_t Host::wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept {
-  const std::atomic<std::uint32_t>& word = architecture_.changes().word;
+  const Atomic<std::uint32_t>& word = architecture_.changes().word;
   while (!is_simulated() && word.load(std::memory_order_acquire) == seen) {
     if (!futex_wait_until(word, seen, until_ns)) break;
   }

@@ -58,8 +58,8 @@ class ShadowThreads::One {
   struct Work {
     std::shared_ptr<Shadow> shadow;
     std::shared_ptr<ShadowSignal> signal{std::make_shared<ShadowSignal>()};
-    std::atomic<bool> is_to_end{false};
-    std::atomic<std::uint32_t> has_ended{0};
+    Atomic<bool> is_to_end{false};
+    Atomic<std::uint32_t> has_ended{0};
 
     void run() noexcept {
       while (!is_to_end.load(std::memory_order_acquire) && !shadow->has_ended()) {

@@ -9,7 +9,7 @@ namespace mauve {
 class Shadow::StillClock final : public Clock {
  public:
   time_ns_t now_ns() const noexcept override { return now_ns_; }
-  bool sleep_until(time_ns_t, const std::atomic<std::uint32_t>&, std::uint32_t) const noexcept override {
+  bool sleep_until(time_ns_t, const Atomic<std::uint32_t>&, std::uint32_t) const noexcept override {
     return false;
   }
   /// Is noted, and no time passes by it. [rt]

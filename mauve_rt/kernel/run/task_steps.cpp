@@ -141,7 +141,7 @@ void Task::signal_event() noexcept {
   }
 }
 
-void Task::await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept {
+void Task::await(const Atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) noexcept {
   for (;;) {
     const std::uint32_t control = control_.load(std::memory_order_acquire);
     if (word.load(std::memory_order_acquire) == number || (control & (kStop | kExit)) != 0) return;

@@ -2,8 +2,7 @@
 // What befalls one component, for any number of signals: it has one listener.
 #pragma once
 
-#include <atomic>
-
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/rules/feeds.hpp"
 #include "mauve_rt/run/task_listener.hpp"
 
@@ -63,7 +62,7 @@ class ComponentFeed final : public Feed, private TaskListener {
   std::vector<Told> told_;
   std::shared_ptr<Component> component_;  // nullptr: it was removed
   std::uint32_t seen_change_{0};
-  std::atomic<double> period_s_{0.0};
+  Atomic<double> period_s_{0.0};
 };
 
 }  // namespace mauve::rules

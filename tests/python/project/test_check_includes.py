@@ -1,4 +1,4 @@
-"""scripts/check_includes.py: what waits, wakes or reads a clock is in the seam alone."""
+"""scripts/check_includes.py: what waits, wakes, reads a clock or is atomic is in the seam alone."""
 
 import subprocess
 import sys
@@ -38,6 +38,12 @@ def check(root: Path, file: str, code: str) -> list[str]:
         ("syscall(SYS_futex, &word);", "SYS_futex"),
         ("syscall(SYS_membarrier, 0, 0, 0);", "SYS_membarrier"),
         ("pthread_mutex_lock(&mutex_);", "pthread_mutex_lock"),
+        ("#include <atomic>", "#include <atomic>"),
+        ("std::atomic<int> count{0};", "std::atomic"),
+        ("std::atomic_thread_fence(std::memory_order_seq_cst);", "std::atomic_thread_fence"),
+        ("std::atomic_ref(byte).fetch_or(0);", "std::atomic_ref"),
+        ("std::atomic_flag is_set;", "std::atomic_flag"),
+        ("__atomic_store_n(&count, 1, __ATOMIC_RELEASE);", "__atomic_store_n"),
         ("pthread_create(&thread, nullptr, run, nullptr);", "pthread_create"),
     ],
 )
@@ -54,7 +60,10 @@ def test_what_goes_past_the_seam_is_found(tmp_path: Path, file: str, code: str, 
         ("kernel/base/seam/futex.cpp", "#include <linux/futex.h>\nsyscall(SYS_futex, &word);\n"),
         ("kernel/include/mauve_rt/base/seam/mutex.hpp", "#include <mutex>\nstd::mutex mutex;\n"),
         ("kernel/run/task.cpp", "sleep_for(kLook);  // std::mutex, clock_gettime\nstd::thread::id thread;\n"),
-        ("bridge/src/thread.hpp", "#include <thread>\n"),
+        ("kernel/include/mauve_rt/base/seam/atomic.hpp", "#include <atomic>\n"),
+        ("kernel/base/allocation.hpp", "#include <atomic>\nstd::atomic<int>* allocation_counter();\n"),
+        ("kernel/run/task.cpp", "Atomic<int> count{0};\ncount.load(std::memory_order_relaxed);\n"),
+        ("bridge/src/thread.hpp", "#include <thread>\nstd::atomic<int> count{0};\n"),
     ],
 )
 def test_what_the_seam_has_passes(tmp_path: Path, file: str, code: str):

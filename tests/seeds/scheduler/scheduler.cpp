@@ -13,12 +13,16 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <stdexcept>
 #include <vector>
 
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve::seeds {
+
+// Threads count it down, one at a time. Before begin(), and in the process of the test program, it has no end.
+constinit std::uint64_t atomics_left{UINT64_MAX};
 
 struct Thread {
   int number{0};
@@ -44,11 +48,12 @@ namespace {
 
 constexpr time_ns_t kFirstInstant = s_to_ns(1000);
 constexpr std::size_t kMostThreads = 512;
+constexpr time_ns_t kOfAnAtomicStep = 2;
 
 /// SplitMix64.
 class Random {
  public:
-  explicit Random(std::uint64_t seed) : state_(seed) {}
+  explicit constexpr Random(std::uint64_t seed) : state_(seed) {}
   std::uint64_t next() noexcept {
     state_ += 0x9e37'79b9'7f4a'7c15U;
     std::uint64_t mixed = state_;
@@ -56,7 +61,8 @@ class Random {
     mixed = (mixed ^ (mixed >> 27U)) * 0x94d0'49bb'1331'11ebU;
     return mixed ^ (mixed >> 31U);
   }
-  std::uint64_t below(std::uint64_t bound) noexcept { return next() % bound; }
+  /// `bound`: below 2^32. By a product, as a division takes ten times as long.
+  std::uint64_t below(std::uint64_t bound) noexcept { return ((next() >> 32U) * bound) >> 32U; }
   time_ns_t up_to(time_ns_t longest_ns) noexcept {
     return static_cast<time_ns_t>(below(static_cast<std::uint64_t>(longest_ns) + 1));
   }
@@ -70,6 +76,7 @@ class Random {
 struct Weather {
   std::uint64_t cpus{1};            // so many of the most urgent threads may run
   std::uint64_t switch_once_in{8};  // calls
+  std::uint64_t atomic_once_in{0};  // steps of atomic operations, of which each has two
   time_ns_t cost_ns{400};           // of a call, at most
   time_ns_t lateness_ns{us_to_ns(50)};
   std::uint64_t stall_once_in{0};  // calls
@@ -80,6 +87,7 @@ struct Weather {
     Weather weather;
     weather.cpus = 1 + random.below(4);
     weather.switch_once_in = std::array<std::uint64_t, 4>{2, 5, 20, 100}[random.below(4)];
+    weather.atomic_once_in = std::array<std::uint64_t, 4>{0, 600, 60, 6}[random.below(4)];
     weather.cost_ns = std::array<time_ns_t, 3>{60, 400, 3'000}[random.below(3)];
     weather.lateness_ns = std::array{us_to_ns(1), us_to_ns(40), us_to_ns(300)}[random.below(3)];
     weather.stall_once_in = std::array<std::uint64_t, 3>{0, 50'000, 5'000}[random.below(3)];
@@ -99,21 +107,37 @@ struct Scheduler {
   Options options;
   Random random{0};
   Weather weather;
-  std::vector<Thread*> threads;
+  std::vector<Thread*> threads;  // by number
+  std::vector<Thread*> alive;    // those that have not ended, in the order of their numbers
+  std::uint64_t inheriting{0};   // of those, wait for a thread that inherits their priority
   Thread* running{nullptr};
   Thread* ending{nullptr};  // gives the baton away at its very end
   time_ns_t now_ns{kFirstInstant};
+  time_ns_t calm_until_ns{0};     // before that instant no other thread preempts the running one
+  std::uint64_t atomics_paid{0};  // the countdown, when time last passed for it
   Outcome outcome{.hash = 0xcbf2'9ce4'8422'2325U};
   std::vector<Event> trace;
 };
 
 /// Never destroyed: threads may use it to the end of the process.
-Scheduler& all() noexcept {
-  static auto* const scheduler = new Scheduler;
-  return *scheduler;
-}
+union NeverDestroyed {
+  constexpr NeverDestroyed() noexcept : scheduler{} {}
+  ~NeverDestroyed() {}
+  Scheduler scheduler;
+};
+constinit NeverDestroyed never_destroyed;
+
+Scheduler& all() noexcept { return never_destroyed.scheduler; }
 
 constinit thread_local Thread* this_thread [[gnu::tls_model("initial-exec")]] = nullptr;
+
+/// Until the next switch at an atomic operation. Where there are none, time passes all the same: a thread may spin.
+void begin_countdown() noexcept {
+  Scheduler& s = all();
+  const std::uint64_t once_in = s.weather.atomic_once_in;
+  atomics_left = once_in == 0 ? 5'000 : 1 + s.random.below(2 * once_in - 1);
+  s.atomics_paid = atomics_left;
+}
 
 void note(const Thread& thread, Call call) noexcept {
   Scheduler& s = all();
@@ -128,15 +152,22 @@ void note(const Thread& thread, Call call) noexcept {
 /// With what it inherits.
 int urgency(const Thread& thread, int depth = 0) noexcept {
   int highest = thread.priority;
-  if (depth > 8) return highest;
-  for (const Thread* other : all().threads) {
-    if (other->inherits == &thread && !other->has_ended)
-      highest = std::max(highest, urgency(*other, depth + 1));
+  if (all().inheriting == 0 || depth > 8) return highest;
+  for (const Thread* other : all().alive) {
+    if (other->inherits == &thread) highest = std::max(highest, urgency(*other, depth + 1));
   }
   return highest;
 }
 
-bool can_run(const Thread& thread) noexcept { return !thread.has_ended && thread.ready_ns <= all().now_ns; }
+void let_inherit(Thread& thread, const Thread* heir) noexcept {
+  Scheduler& s = all();
+  if (thread.inherits != nullptr) --s.inheriting;
+  if (heir != nullptr) ++s.inheriting;
+  thread.inherits = heir;
+  s.calm_until_ns = 0;
+}
+
+bool can_run(const Thread& thread) noexcept { return thread.ready_ns <= all().now_ns; }
 
 void await_baton(Thread& thread) noexcept {
   while (sem_wait(&thread.baton) != 0) {
@@ -167,24 +198,25 @@ std::string describe(const Thread& thread) {
 /// Passes time until somebody can run; who is next.
 Thread& choose() noexcept {
   Scheduler& s = all();
-  std::array<Thread*, kMostThreads> able{};
-  std::array<int, kMostThreads> urgencies{};
+  std::array<Thread*, kMostThreads> able;  // not initialized: that would take most of the time
+  std::array<int, kMostThreads> urgencies;
   for (;;) {
     std::size_t count = 0;
     time_ns_t earliest_ns = kForever;
-    for (Thread* thread : s.threads) {
+    for (Thread* thread : s.alive) {
       if (can_run(*thread)) {
         urgencies[count] = urgency(*thread);
         able[count++] = thread;
-      } else if (!thread->has_ended) {
+      } else {
         earliest_ns = std::min(earliest_ns, thread->ready_ns);
       }
     }
     if (count == 0) {
       if (earliest_ns == kForever) fail("deadlock: each thread waits to be woken");
-      s.now_ns = std::max(s.now_ns, earliest_ns);
+      s.now_ns = earliest_ns;
       continue;
     }
+    s.calm_until_ns = earliest_ns;
     // So many of the most urgent ones run at once on that many processors; any of these may be the next to come to a call.
     const std::size_t wanted = s.random.below(std::min<std::uint64_t>(s.weather.cpus, count));
     for (std::size_t i = 0; i <= wanted; ++i) {
@@ -212,14 +244,23 @@ void reschedule() noexcept {
   await_baton(before);
 }
 
-/// Whether more threads than there are processors are more urgent.
+/// Whether at least as many threads as there are processors are more urgent.
 bool is_preempted(const Thread& thread) noexcept {
+  Scheduler& s = all();
+  if (s.now_ns < s.calm_until_ns) return false;
   std::uint64_t more_urgent = 0;
+  time_ns_t earliest_ns = kForever;
   const int own = urgency(thread);
-  for (const Thread* other : all().threads) {
-    if (other != &thread && can_run(*other) && urgency(*other) > own) ++more_urgent;
+  for (const Thread* other : s.alive) {
+    if (!can_run(*other)) {
+      earliest_ns = std::min(earliest_ns, other->ready_ns);
+    } else if (other != &thread && urgency(*other) > own) {
+      ++more_urgent;
+    }
   }
-  return more_urgent >= all().weather.cpus;
+  if (more_urgent >= s.weather.cpus) return true;
+  s.calm_until_ns = earliest_ns;
+  return false;
 }
 
 time_ns_t lateness_ns() noexcept {
@@ -241,6 +282,42 @@ void wake(Thread& thread) noexcept {
   thread.is_woken = true;
   thread.address = nullptr;
   thread.ready_ns = std::min(thread.ready_ns, all().now_ns + lateness_ns());
+  all().calm_until_ns = 0;
+}
+
+void check_limits() noexcept {
+  const Scheduler& s = all();
+  if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
+  if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
+}
+
+/// A call begins, or an atomic operation that may be a switch: the time that passed is paid.
+void enter(Thread& thread, Call call) noexcept {
+  Scheduler& s = all();
+  const time_ns_t cost_ns = static_cast<time_ns_t>(s.atomics_paid - atomics_left) * kOfAnAtomicStep;
+  s.atomics_paid = atomics_left;
+  s.now_ns += cost_ns;
+  thread.cpu_ns += cost_ns;
+  thread.call = call;
+  ++s.outcome.calls;
+  note(thread, call);
+  check_limits();
+}
+
+/// It costs up to that time.
+void step(Thread& thread, Call call, time_ns_t longest_ns) noexcept {
+  Scheduler& s = all();
+  enter(thread, call);
+  const time_ns_t cost_ns = 20 + s.random.up_to(longest_ns);
+  s.now_ns += cost_ns;
+  thread.cpu_ns += cost_ns;
+  if (s.random.once_in(s.weather.stall_once_in)) {
+    note(thread, Call::stall);
+    const time_ns_t stall_ns = s.random.up_to(s.weather.stall_ns);
+    s.now_ns += stall_ns;
+    s.outcome.stalled_ns += stall_ns;
+  }
+  if (s.random.once_in(s.weather.switch_once_in) || is_preempted(thread)) reschedule();
 }
 
 /// The last that a thread does: its thread-local objects are gone by then.
@@ -250,7 +327,9 @@ struct AtTheEnd {
   ~AtTheEnd() {
     step(Call::thread_end);
     thread->has_ended = true;
+    std::erase(all().alive, thread);
     wake_all(thread);
+    this_thread = nullptr;
     Thread& next = choose();
     all().ending = thread;
     pass_baton(next);
@@ -279,10 +358,20 @@ void print_stack(int /*signal*/) {
 
 const char* to_string(Call call) noexcept {
   static constexpr std::array kNames{
-      "begin",        "clock",        "sleep",       "yield",      "futex_wait",  "futex_wake", "futex_lock",
-      "futex_unlock", "lock",         "try_lock",    "unlock",     "lock_shared", "cond_wait",  "cond_notify",
-      "barrier",      "thread_start", "thread_join", "thread_end", "signal_wait", "stall"};
+      "begin",       "clock",        "sleep",   "yield",        "futex_wait",  "futex_wake",
+      "futex_lock",  "futex_unlock", "lock",    "try_lock",     "unlock",      "lock_shared",
+      "cond_wait",   "cond_notify",  "barrier", "thread_start", "thread_join", "thread_end",
+      "signal_wait", "stall",        "atomic",  "compute"};
   return kNames[static_cast<std::size_t>(call)];
+}
+
+void prepare_forks() noexcept {
+  std::array<void*, 1> first{};
+  backtrace(first.data(), 1);
+  try {
+    throw std::runtime_error("prepared");
+  } catch (const std::runtime_error&) {  // thrown to be caught
+  }
 }
 
 void begin(const Options& options) {
@@ -295,8 +384,7 @@ void begin(const Options& options) {
   s.outcome.calls = 0;
   s.now_ns = kFirstInstant;
   main.ready_ns = 0;
-  std::array<void*, 1> first{};
-  backtrace(first.data(), 1);  // loads what it needs
+  begin_countdown();
   struct sigaction action{};
   action.sa_handler = &print_stack;
   sigaction(SIGUSR2, &action, nullptr);
@@ -305,15 +393,13 @@ void begin(const Options& options) {
 Outcome outcome() noexcept {
   Outcome outcome = all().outcome;
   outcome.passed_ns = all().now_ns - kFirstInstant;
-  for (const Thread* thread : all().threads) outcome.alive += thread->has_ended ? 0 : 1;
+  outcome.alive = static_cast<int>(all().alive.size());
   return outcome;
 }
 
 std::string alive() {
   std::string text;
-  for (const Thread* thread : all().threads) {
-    if (!thread->has_ended) text += describe(*thread) + "\n";
-  }
+  for (const Thread* thread : all().alive) text += describe(*thread) + "\n";
   return text;
 }
 
@@ -339,29 +425,26 @@ Thread& self() noexcept {
   main->handle = pthread_self();
   sem_init(&main->baton, 0, 0);
   s.threads.reserve(kMostThreads);
+  s.alive.reserve(kMostThreads);
   s.threads.push_back(main);
+  s.alive.push_back(main);
   s.running = main;
   return *(this_thread = main);
 }
 
-void step(Call call) noexcept {
-  Scheduler& s = all();
+void switch_at_atomic() noexcept {
+  enter(self(), Call::atomic);
+  begin_countdown();
+  reschedule();
+}
+
+void step(Call call) noexcept { step(self(), call, all().weather.cost_ns); }
+
+void compute(time_ns_t length_ns) noexcept {
+  constexpr time_ns_t kSlice = us_to_ns(10);
   Thread& thread = self();
-  thread.call = call;
-  ++s.outcome.calls;
-  note(thread, call);
-  const time_ns_t cost_ns = 20 + s.random.up_to(s.weather.cost_ns);
-  s.now_ns += cost_ns;
-  thread.cpu_ns += cost_ns;
-  if (s.random.once_in(s.weather.stall_once_in)) {
-    note(thread, Call::stall);
-    const time_ns_t stall_ns = s.random.up_to(s.weather.stall_ns);
-    s.now_ns += stall_ns;
-    s.outcome.stalled_ns += stall_ns;
-  }
-  if (s.outcome.calls > s.options.most_calls) fail("livelock: too many calls of the seam");
-  if (s.now_ns - kFirstInstant > s.options.longest_ns) fail("livelock: too much time has passed");
-  if (s.random.once_in(s.weather.switch_once_in) || is_preempted(thread)) reschedule();
+  const time_ns_t until_ns = thread.cpu_ns + length_ns;
+  while (thread.cpu_ns < until_ns) step(thread, Call::compute, std::min(kSlice, until_ns - thread.cpu_ns));
 }
 
 bool block(Call call, const void* address, time_ns_t until_ns, bool by_chance) noexcept {
@@ -386,17 +469,16 @@ bool block(Call call, const void* address, time_ns_t until_ns, bool by_chance) n
 }
 
 void wake_all(const void* address) noexcept {
-  for (Thread* thread : all().threads) {
-    if (thread->address == address && !thread->has_ended && address != nullptr) wake(*thread);
+  for (Thread* thread : all().alive) {
+    if (thread->address == address) wake(*thread);
   }
 }
 
 void wake_one(const void* address) noexcept {
   Thread* chosen = nullptr;
   std::uint64_t waiting = 0;
-  for (Thread* thread : all().threads) {
-    if (thread->address == address && !thread->has_ended && all().random.below(++waiting) == 0)
-      chosen = thread;
+  for (Thread* thread : all().alive) {
+    if (thread->address == address && all().random.below(++waiting) == 0) chosen = thread;
   }
   if (chosen != nullptr) wake(*chosen);
 }
@@ -423,6 +505,8 @@ Thread* start(const NewThread& made, int& error) {
   if (error != 0) return nullptr;
   thread->ready_ns = s.now_ns + lateness_ns();
   s.threads.push_back(thread);
+  s.alive.push_back(thread);
+  s.calm_until_ns = 0;
   step(Call::thread_start);
   return thread;
 }
@@ -454,9 +538,9 @@ bool Lock::lock_until(time_ns_t until_ns) noexcept {
   Thread& thread = self();
   while (!take()) {
     if (holder_ == &thread) return false;
-    if (inherits_) thread.inherits = holder_;
+    if (inherits_) let_inherit(thread, holder_);
     const bool is_woken = block(Call::lock, this, until_ns, false);
-    thread.inherits = nullptr;
+    if (inherits_) let_inherit(thread, nullptr);
     if (!is_woken) return take();
   }
   return true;
@@ -466,8 +550,10 @@ void Lock::release() noexcept {
   if (holder_ != &self()) fail("a thread unlocks a lock that it does not hold");
   if (--depth_ > 0) return;
   holder_ = nullptr;
-  for (Thread* thread : all().threads) {
-    if (thread->address == this) thread->inherits = nullptr;
+  if (inherits_) {
+    for (Thread* thread : all().alive) {
+      if (thread->address == this) let_inherit(*thread, nullptr);
+    }
   }
   wake_all(this);
 }
@@ -483,12 +569,9 @@ void fail(const std::string& what) noexcept {
   Scheduler& s = all();
   std::string text = "seed " + std::to_string(s.options.seed) + ", after " +
                      std::to_string((s.now_ns - kFirstInstant) / 1000) + " us: " + what + "\n";
-  for (const Thread* thread : s.threads) {
-    if (!thread->has_ended) text += describe(*thread) + "\n";
-  }
+  text += alive();
   std::fputs(text.c_str(), stderr);
-  for (const Thread* thread : s.threads) {
-    if (thread->has_ended) continue;
+  for (const Thread* thread : s.alive) {
     std::fprintf(stderr, "-- thread %d '%s'\n", thread->number, thread->name.data());
     pthread_kill(thread->handle, SIGUSR2);
     usleep(20'000);
@@ -502,58 +585,58 @@ namespace mauve {
 
 using seeds::Call;
 
-bool futex_wait_until(const std::atomic<std::uint32_t>& word, std::uint32_t expected,
+bool futex_wait_until(const Atomic<std::uint32_t>& word, std::uint32_t expected,
                       time_ns_t until_ns) noexcept {
   seeds::step(Call::futex_wait);
-  if (word.load(std::memory_order_relaxed) != expected) return true;
+  if (word.system().load() != expected) return true;
   return seeds::block(Call::futex_wait, &word, until_ns, true);
 }
 
-void futex_wake_all(const std::atomic<std::uint32_t>& word) noexcept {
+void futex_wake_all(const Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_wake);
   seeds::wake_all(&word);
 }
 
-bool futex_lock_pi(std::atomic<std::uint32_t>& word) noexcept {
+bool futex_lock_pi(Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_lock);
   seeds::Thread& self = seeds::self();
-  const std::uint32_t found = word.load(std::memory_order_relaxed);
+  const std::uint32_t found = word.system().load();
   if ((found & kFutexHolder) == 0) {
-    word.store(self.id, std::memory_order_relaxed);
+    word.system().store(self.id);
     return true;
   }
   const seeds::Thread* holder = nullptr;
-  for (const seeds::Thread* thread : seeds::all().threads) {
-    if (!thread->has_ended && thread->id == (found & kFutexHolder)) holder = thread;
+  for (const seeds::Thread* thread : seeds::all().alive) {
+    if (thread->id == (found & kFutexHolder)) holder = thread;
   }
   if (holder == nullptr || holder == &self) return false;
-  word.store(found | FUTEX_WAITERS, std::memory_order_relaxed);
+  word.system().store(found | FUTEX_WAITERS);
   self.is_granted = false;
-  self.inherits = holder;
+  seeds::let_inherit(self, holder);
   while (!self.is_granted) seeds::block(Call::futex_lock, &word, kForever, false);
-  self.inherits = nullptr;
+  seeds::let_inherit(self, nullptr);
   return true;
 }
 
 /// To the most urgent waiter.
-bool futex_unlock_pi(std::atomic<std::uint32_t>& word) noexcept {
+bool futex_unlock_pi(Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_unlock);
   const seeds::Thread& self = seeds::self();
-  if ((word.load(std::memory_order_relaxed) & kFutexHolder) != self.id) return false;
+  if ((word.system().load() & kFutexHolder) != self.id) return false;
   seeds::Thread* next = nullptr;
   std::uint32_t waiting = 0;
-  for (seeds::Thread* thread : seeds::all().threads) {
-    if (thread->address != &word || thread->has_ended) continue;
+  for (seeds::Thread* thread : seeds::all().alive) {
+    if (thread->address != &word) continue;
     ++waiting;
     if (next == nullptr || seeds::urgency(*thread) > seeds::urgency(*next)) next = thread;
   }
   if (next == nullptr) {
-    word.store(0, std::memory_order_relaxed);
+    word.system().store(0);
     return true;
   }
-  word.store(next->id | (waiting > 1 ? FUTEX_WAITERS : 0), std::memory_order_relaxed);
-  for (seeds::Thread* thread : seeds::all().threads) {
-    if (thread->address == &word) thread->inherits = thread != next ? next : nullptr;
+  word.system().store(next->id | (waiting > 1 ? FUTEX_WAITERS : 0));
+  for (seeds::Thread* thread : seeds::all().alive) {
+    if (thread->address == &word) seeds::let_inherit(*thread, thread != next ? next : nullptr);
   }
   next->is_granted = true;
   seeds::wake(*next);
@@ -564,9 +647,10 @@ bool futex_unlock_pi(std::atomic<std::uint32_t>& word) noexcept {
 
 /// The kernel demotes threads by this function of the system; it finds this one first.
 extern "C" int pthread_setschedparam(pthread_t handle, int policy, const sched_param* parameters) noexcept {
-  for (mauve::seeds::Thread* thread : mauve::seeds::all().threads) {
-    if (thread->has_ended || pthread_equal(thread->handle, handle) == 0) continue;
+  for (mauve::seeds::Thread* thread : mauve::seeds::all().alive) {
+    if (pthread_equal(thread->handle, handle) == 0) continue;
     thread->priority = policy == SCHED_FIFO ? parameters->sched_priority : 0;
+    mauve::seeds::all().calm_until_ns = 0;
     return 0;
   }
   return ESRCH;

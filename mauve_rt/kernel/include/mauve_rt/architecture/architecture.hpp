@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <deque>
 #include <functional>
 #include <map>
@@ -18,6 +17,7 @@
 #include "mauve_rt/architecture/open_change.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/seam/shared_mutex.hpp"
 #include "mauve_rt/change/transaction.hpp"
@@ -72,7 +72,7 @@ enum class EarlierChange : std::uint8_t {
 struct ArchitecturePresence {
   SharedMutex mutex;
   Architecture* architecture;
-  std::atomic<int> renewals{0};  // of fallback cores, that are not over
+  Atomic<int> renewals{0};  // of fallback cores, that are not over
 };
 
 /// Each is claimed by one change at a time.
@@ -367,13 +367,13 @@ class Architecture final : public Configurable {
   std::vector<OpenChange*> prepared_;
   mutable Mutex open_mutex_;  // for a moment: no hook, and no other lock of a change but Work's facts
   std::vector<std::shared_ptr<OpenChange>> open_;
-  std::atomic<bool> has_open_{false};
+  Atomic<bool> has_open_{false};
   mutable Mutex host_mutex_;
   Runner* host_ MAUVE_GUARDED_BY(host_mutex_){nullptr};
   ChangeSignal changes_;
   Authors authors_;
   Notifier publications_;
-  std::atomic<time_ns_t> deployment_epoch_ns_{0};
+  Atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable Mutex list_mutex_;
   std::vector<std::string> names_ MAUVE_GUARDED_BY(list_mutex_);  // by number
   std::map<std::uint16_t, std::weak_ptr<const Component>> numbered_

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "mauve_rt/architecture/given_resources.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 #include "mauve_rt/data/port.hpp"
@@ -255,7 +255,7 @@ class PluginRegistry {
   Kinds resources_;                                                      // by kind
   std::map<std::string, PortFactories> ports_ MAUVE_GUARDED_BY(mutex_);  // by type
   // acquire/release: who sees the new number finds the new entries
-  std::atomic<std::uint32_t> version_{0};
+  Atomic<std::uint32_t> version_{0};
   int generation_{1};                           // of what is added
   std::shared_ptr<PluginGeneration> replaced_;  // while a generation is loaded
 };

@@ -2,10 +2,10 @@
 // Runner: what a change asks of whom that runs the architecture.
 #pragma once
 
-#include <atomic>
 #include <memory>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/shared_mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -57,8 +57,8 @@ class Runner {
   void wait_unused() noexcept { const LockGuard lock(in_use_); }
 
  private:
-  std::atomic<bool> deployed_{false};
-  std::atomic<std::uint32_t> deployments_{0};
+  Atomic<bool> deployed_{false};
+  Atomic<std::uint32_t> deployments_{0};
   SharedMutex in_use_;
 };
 

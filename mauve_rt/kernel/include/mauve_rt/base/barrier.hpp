@@ -2,9 +2,9 @@
 // Barrier: threads meet once.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 
 namespace mauve {
@@ -32,7 +32,7 @@ class Barrier {
   }
 
  private:
-  std::atomic<std::uint32_t> missing_;
+  Atomic<std::uint32_t> missing_;
 };
 
 }  // namespace mauve

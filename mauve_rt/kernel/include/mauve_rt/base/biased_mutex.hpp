@@ -2,12 +2,12 @@
 // A priority-inheritance mutex that one of its users enters without an atomic read-modify-write.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/process_barrier.hpp"
 #include "mauve_rt/base/this_thread.hpp"
 
@@ -56,9 +56,9 @@ class MAUVE_LOCK BiasedMutex {
     void hand_over() MAUVE_RT;
     void await_leave() MAUVE_RT;
 
-    std::atomic<std::uint32_t> inside_{0};
-    std::atomic<std::uint32_t> handover_{0};
-    std::atomic<std::uint32_t> id_{0};
+    Atomic<std::uint32_t> inside_{0};
+    Atomic<std::uint32_t> handover_{0};
+    Atomic<std::uint32_t> id_{0};
     Seat* next_{nullptr};
   };
 
@@ -135,9 +135,9 @@ class MAUVE_LOCK BiasedMutex {
   void revoke(Seat& granted) MAUVE_RT MAUVE_REQUIRES(mutex_);
   void grant() MAUVE_RT MAUVE_REQUIRES(this);
 
-  std::atomic<Seat*> owner_{nullptr};
+  Atomic<Seat*> owner_{nullptr};
   PiMutex mutex_;
-  std::atomic<Seat*> granted_{nullptr};
+  Atomic<Seat*> granted_{nullptr};
   Seat* first_ MAUVE_GUARDED_BY(this){nullptr};
   bool is_shared_ MAUVE_GUARDED_BY(this){false};
 };

@@ -2,9 +2,9 @@
 // What a component's ports, core and fsm may ask of the task that runs them.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/base/trace.hpp"
 
@@ -18,9 +18,9 @@ namespace mauve {
 /// | instant_ns | component  | any thread | relaxed: likewise                                    |
 /// | period_ns  | commits    | any thread | relaxed: likewise                                    |
 struct Context {
-  std::atomic<time_ns_t> clock_ns{0};    // the logical clock
-  std::atomic<time_ns_t> instant_ns{0};  // nominal instant of the last entry of the initial state
-  std::atomic<time_ns_t> period_ns{0};   // g; 0 for a sporadic fsm
+  Atomic<time_ns_t> clock_ns{0};    // the logical clock
+  Atomic<time_ns_t> instant_ns{0};  // nominal instant of the last entry of the initial state
+  Atomic<time_ns_t> period_ns{0};   // g; 0 for a sporadic fsm
 };
 
 }  // namespace mauve

@@ -2,10 +2,10 @@
 // A priority-inheritance mutex that traces contention and knows how many its thread holds.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/inheriting_lock.hpp"
 #include "mauve_rt/base/thread_safety.hpp"
 #include "mauve_rt/base/time.hpp"
@@ -46,7 +46,7 @@ class MAUVE_LOCK PiMutex {
   /// How many PiMutexes the calling thread holds; not 0 at a state boundary is a fault. [rt]
   static int held_by_this_thread() MAUVE_RT;
   /// The same for others to look at, while the calling thread lives. [rt]
-  static const std::atomic<int>& count_of_this_thread() MAUVE_RT;
+  static const Atomic<int>& count_of_this_thread() MAUVE_RT;
   /// Unlocks what the calling thread has locked since it held so many. [rt]
   static void let_go_of_all_but(int held) MAUVE_RT MAUVE_LOCKS_UNSEEN;  // which, its list says
   /// Whether the calling thread has, since the last call, taken a lock twice or let go of one it did not hold. [rt]
@@ -58,7 +58,7 @@ class MAUVE_LOCK PiMutex {
   void forget_held() noexcept MAUVE_LOCKS_UNSEEN;  // the thread holds it, says its list
 
   InheritingLock mutex_;
-  std::atomic<std::int32_t> holder_{0};  // thread id, for the trace only
+  Atomic<std::int32_t> holder_{0};  // thread id, for the trace only
   std::uint32_t trace_id_{0};
   std::uint32_t depth_{0};   // how often its holder has taken it again
   PiMutex* below_{nullptr};  // the one that its holder had locked last before it

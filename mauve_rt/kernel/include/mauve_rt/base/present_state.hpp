@@ -2,11 +2,11 @@
 // What a component is at: told by its own thread on entering a state, so that it is seen also while that lasts.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <optional>
 #include <string>
 
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -65,9 +65,9 @@ class PresentState {
   static constexpr time_ns_t kChanging = -1;
   static constexpr std::uint64_t kWait = std::uint64_t{1} << 32U;  // beside the name
 
-  std::atomic<time_ns_t> since_ns_{0};  // two states never begin at one instant: it tells one from the next
-  std::atomic<time_ns_t> bound_ns_{0};
-  std::atomic<std::uint64_t> what_{0};
+  Atomic<time_ns_t> since_ns_{0};  // two states never begin at one instant: it tells one from the next
+  Atomic<time_ns_t> bound_ns_{0};
+  Atomic<std::uint64_t> what_{0};
 };
 
 }  // namespace mauve

@@ -2,9 +2,8 @@
 // Previews: in place of a value, a value for the calling thread alone.
 #pragma once
 
-#include <atomic>
-
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/this_thread.hpp"
 
@@ -79,13 +78,13 @@ class Previews {
  private:
   static constexpr pthread_t kNobody{};  // as glibc never calls a thread
   struct Place {
-    std::atomic<pthread_t> thread{kNobody};
+    Atomic<pthread_t> thread{kNobody};
     T value{};
     Place* next{nullptr};
   };
 
   mutable Mutex mutex_;  // for a moment: no hook, and no thread of a component
-  std::atomic<Place*> first_{nullptr};
+  Atomic<Place*> first_{nullptr};
 };
 
 }  // namespace mauve

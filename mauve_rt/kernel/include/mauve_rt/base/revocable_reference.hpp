@@ -2,11 +2,11 @@
 // RevocableReference: a reference to an object for other threads, until its owner revokes it.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -64,9 +64,9 @@ class RevocableReference {
     return is_unused;
   }
 
-  std::atomic<T*> object_{nullptr};
-  std::atomic<std::uint32_t> users_{0};
-  std::atomic<std::uint32_t> waiting_{0};
+  Atomic<T*> object_{nullptr};
+  Atomic<std::uint32_t> users_{0};
+  Atomic<std::uint32_t> waiting_{0};
 };
 
 }  // namespace mauve

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <type_traits>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -57,9 +57,9 @@ class SequenceCell {
   }
 
  private:
-  alignas(64) std::atomic<std::uint64_t> version_{0};
-  std::atomic<time_ns_t> time_ns_{0};
-  std::array<std::atomic<std::uint64_t>, kWords> words_{};
+  alignas(64) Atomic<std::uint64_t> version_{0};
+  Atomic<time_ns_t> time_ns_{0};
+  std::array<Atomic<std::uint64_t>, kWords> words_{};
 };
 
 }  // namespace mauve

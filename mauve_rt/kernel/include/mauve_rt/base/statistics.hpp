@@ -3,9 +3,9 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -26,8 +26,8 @@ class Maximum {
   time_ns_t take_recent_ns() const MAUVE_RT { return recent_.exchange(0, std::memory_order_relaxed); }
 
  private:
-  std::atomic<time_ns_t> max_{0};
-  mutable std::atomic<time_ns_t> recent_{0};  // the taker's, who may only look at the rest
+  Atomic<time_ns_t> max_{0};
+  mutable Atomic<time_ns_t> recent_{0};  // the taker's, who may only look at the rest
 };
 
 /// Latencies in buckets of at most 1/8 relative width. One writer; readers see a recent state.
@@ -43,7 +43,7 @@ class LatencyHistogram {
 
  private:
   static constexpr std::size_t kSubBuckets = 8;
-  std::array<std::atomic<std::uint32_t>, 40 * kSubBuckets> counts_{};
+  std::array<Atomic<std::uint32_t>, 40 * kSubBuckets> counts_{};
   Maximum max_;
 };
 
@@ -69,16 +69,16 @@ class ExecutionTime {
   const Maximum& maximum() const MAUVE_RT { return max_; }
 
  private:
-  std::atomic<std::uint64_t> count_{0};
-  std::atomic<time_ns_t> total_{0};
+  Atomic<std::uint64_t> count_{0};
+  Atomic<time_ns_t> total_{0};
   Maximum max_;
 };
 
 /// One writer (the component's thread), relaxed for the same reason.
 struct TaskStatistics {
-  std::atomic<std::uint64_t> releases{0};
-  std::atomic<std::uint64_t> overruns{0};
-  std::atomic<std::uint64_t> skipped{0};
+  Atomic<std::uint64_t> releases{0};
+  Atomic<std::uint64_t> overruns{0};
+  Atomic<std::uint64_t> skipped{0};
   LatencyHistogram wakeup;
   Maximum response;
 };

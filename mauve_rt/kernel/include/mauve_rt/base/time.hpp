@@ -2,10 +2,10 @@
 // Time: int64 nanoseconds of CLOCK_MONOTONIC, behind a Clock interface.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/clocks.hpp"
 
 namespace mauve {
@@ -39,7 +39,7 @@ class Clock {
   virtual time_ns_t now_ns() const MAUVE_RT = 0;
   /// Sleeps until the instant, or until the word no longer holds `expected`, whichever is first. [rt]
   /// Returns true when the instant was reached. Interrupted sleeps (EINTR) are resumed.
-  virtual bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
+  virtual bool sleep_until(time_ns_t instant_ns, const Atomic<std::uint32_t>& word,
                            std::uint32_t expected) const MAUVE_RT = 0;
   /// An execution state has ended that takes so much time where time is simulated: that passes by it. [rt]
   virtual void spend(time_ns_t /*simulated_ns*/) const MAUVE_RT {}
@@ -53,7 +53,7 @@ class Clock {
 class MonotonicClock final : public Clock {
  public:
   time_ns_t now_ns() const noexcept override;
-  bool sleep_until(time_ns_t instant_ns, const std::atomic<std::uint32_t>& word,
+  bool sleep_until(time_ns_t instant_ns, const Atomic<std::uint32_t>& word,
                    std::uint32_t expected) const noexcept override;
   /// The process's one instance. [rt]
   static const MonotonicClock& instance() MAUVE_RT;

@@ -2,7 +2,6 @@
 // Trace records in per-thread wait-free rings; loss is counted, never silent.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -139,10 +139,10 @@ class TraceRing {
   std::uint16_t component_;
   std::uint64_t first_{0};
   const Clock* clock_{nullptr};  // nullptr: monotonic, without a virtual call
-  alignas(64) std::atomic<std::uint64_t> head_{0};
+  alignas(64) Atomic<std::uint64_t> head_{0};
   std::uint64_t seen_tail_{0};
-  std::atomic<std::uint64_t> dropped_{0};
-  alignas(64) std::atomic<std::uint64_t> tail_{0};
+  Atomic<std::uint64_t> dropped_{0};
+  alignas(64) Atomic<std::uint64_t> tail_{0};
 };
 
 /// Records an event of the user's own on the calling component's thread; nothing elsewhere. [rt]

@@ -2,10 +2,10 @@
 // Waiter: what data and parts ask of the thread that runs a component, when it is to wait or to be woken.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -18,7 +18,7 @@ class Waiter {
 
   /// Sleeps until the word holds the number, at most until the instant, or until the component is to stop. [rt],
   /// its own thread. Who sets the word calls signal_awaited() then.
-  virtual void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns)
+  virtual void await(const Atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns)
       MAUVE_RT = 0;
   virtual void signal_awaited() MAUVE_RT = 0;
   /// Whether the state under way is the last before a park. [rt]

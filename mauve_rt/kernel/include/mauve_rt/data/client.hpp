@@ -2,13 +2,13 @@
 // Client: a resource whose calls somebody outside of the architecture answers, a ROS service as a rule.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 
 #include "mauve_rt/base/function_ref.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/resource.hpp"
@@ -79,8 +79,8 @@ class ClientBase : public Resource {
   Waiter* caller_ MAUVE_GUARDED_BY(mutex_){nullptr};  // nullptr: a thread that is no component's
   CallOutcome outcome_ MAUVE_GUARDED_BY(mutex_){CallOutcome::answered};
   CallCounts counts_ MAUVE_GUARDED_BY(mutex_);
-  std::atomic<std::uint32_t> ended_{0};  // the number of the last call that ended
-  std::atomic<bool> is_connected_{false};
+  Atomic<std::uint32_t> ended_{0};  // the number of the last call that ended
+  Atomic<bool> is_connected_{false};
 };
 
 /// Offers the service `call` of the type.

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -12,6 +11,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/sequence_cell.hpp"
 #include "mauve_rt/data/service.hpp"
 
@@ -140,7 +140,7 @@ class LatestRegister {
   struct Nothing {};
 
   struct alignas(kCacheLine) Slot {
-    std::atomic<std::uint64_t> released{0};
+    Atomic<std::uint64_t> released{0};
     std::uint64_t taken{0};
     Entry entry;
   };
@@ -189,9 +189,9 @@ class LatestRegister {
   }
 
   [[no_unique_address]] std::conditional_t<kHasFront, SequenceCell<T>, Nothing> front_;
-  alignas(kCacheLine) std::atomic<std::uint64_t> word_{0};
+  alignas(kCacheLine) Atomic<std::uint64_t> word_{0};
   alignas(kCacheLine) std::uint64_t sequence_{0};  // of the writer
-  alignas(kCacheLine) std::atomic<const Table*> table_{nullptr};
+  alignas(kCacheLine) Atomic<const Table*> table_{nullptr};
   std::vector<std::unique_ptr<Slot>> slots_;
   std::vector<std::unique_ptr<Table>> tables_;
 };

@@ -2,7 +2,6 @@
 // NewestValue: what shared_data and latest_value have in common, the newest value for readers that never wait.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
@@ -134,8 +134,8 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   LatestRegister<T> register_;
   PiMutex others_mutex_;
   Mutex room_mutex_;
-  std::atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
-  std::atomic<std::uint32_t> seats_{0};
+  Atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
+  Atomic<std::uint32_t> seats_{0};
 
  public:
   Read read{*this};

@@ -2,7 +2,6 @@
 // What all ports are, whatever they carry: a name, a kind, a type, and one connection that can be exchanged.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <span>
 #include <string>
@@ -14,6 +13,7 @@
 #include "mauve_rt/base/previews.hpp"
 #include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/output_watch.hpp"
 #include "mauve_rt/data/port_cell.hpp"
@@ -248,7 +248,7 @@ class PortBase {
   PortConnection connection_;
   const Context* context_{nullptr};
   bool optional_{false};
-  std::atomic<std::uint32_t> special_{0};
+  Atomic<std::uint32_t> special_{0};
   bool is_safe_{false};
   bool is_counted_{true};  // among the ports of its service
   BiasedMutex::Seat own_seat_;

@@ -2,7 +2,6 @@
 // Resources: data plus the services to reach it.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -13,6 +12,7 @@
 #include "mauve_rt/base/configurable.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/service.hpp"
@@ -38,8 +38,8 @@ class Notifier {
   std::uint32_t word() const MAUVE_RT { return word_.load(std::memory_order_seq_cst); }
 
  private:
-  std::atomic<std::uint32_t> word_{0};
-  std::atomic<bool> waiting_{false};
+  Atomic<std::uint32_t> word_{0};
+  Atomic<bool> waiting_{false};
 };
 
 /// Someone told of every write to a resource, e.g. a task that waits for one.
@@ -98,7 +98,7 @@ class EventListeners {
   Mutex change_mutex_;
   PiMutex mutex_;
   std::vector<EventListener*> listeners_;
-  std::atomic<std::size_t> count_{0};
+  Atomic<std::size_t> count_{0};
 };
 
 /// How a resource is bound to a topic.

@@ -2,7 +2,6 @@
 // RingBuffer: a queue of bounded length; a read removes, so each element goes to one reader.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
@@ -10,6 +9,7 @@
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/biased_write.hpp"
@@ -103,15 +103,15 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   };
   /// Elements are counted from 1 on, by their sequence.
   struct alignas(kCacheLine) Writers {
-    std::atomic<std::uint64_t> tail{0};  // elements written so far
-    std::uint64_t head{0};               // as seen last
-    std::size_t place{0};                // of the next element
-    std::atomic<std::uint64_t> lost{0};
+    Atomic<std::uint64_t> tail{0};  // elements written so far
+    std::uint64_t head{0};          // as seen last
+    std::size_t place{0};           // of the next element
+    Atomic<std::uint64_t> lost{0};
   };
   struct alignas(kCacheLine) Readers {
-    std::atomic<std::uint64_t> head{0};  // elements removed so far
-    std::uint64_t tail{0};               // as seen last
-    std::size_t place{0};                // of the oldest element
+    Atomic<std::uint64_t> head{0};  // elements removed so far
+    std::uint64_t tail{0};          // as seen last
+    std::size_t place{0};           // of the oldest element
   };
   class Read final : public ReadService<T> {
    public:

@@ -2,7 +2,6 @@
 // Services: what resources offer and ports connect to.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -11,6 +10,7 @@
 
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 
@@ -92,7 +92,7 @@ class WriteFloor {
   void forget() noexcept { instant_ns_.store(INT64_MIN, std::memory_order_relaxed); }
 
  private:
-  std::atomic<time_ns_t> instant_ns_{INT64_MIN};
+  Atomic<time_ns_t> instant_ns_{INT64_MIN};
 };
 
 class Resource;
@@ -184,8 +184,8 @@ class ServiceBase {
   PortKind kind_;
   std::string type_;
   Resource* resource_{nullptr};
-  std::atomic<std::uint32_t> ports_{0};
-  std::atomic<std::uint32_t> inputs_{0};
+  Atomic<std::uint32_t> ports_{0};
+  Atomic<std::uint32_t> inputs_{0};
   time_ns_t since_ns_{0};
 };
 

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -93,8 +93,8 @@ class WriteLog {
  private:
   struct Ring {
     std::vector<Place> places;
-    std::atomic<std::uint64_t> written{0};
-    std::atomic<std::uint64_t> taken{0};
+    Atomic<std::uint64_t> written{0};
+    Atomic<std::uint64_t> taken{0};
   };
 
   template <typename Lock>
@@ -110,7 +110,7 @@ class WriteLog {
   Ring* ring_{nullptr};
   Mutex mutex_;
   std::unique_ptr<Ring> kept_ MAUVE_GUARDED_BY(mutex_);
-  std::atomic<std::uint64_t> lost_{0};
+  Atomic<std::uint64_t> lost_{0};
 };
 
 }  // namespace mauve

@@ -2,10 +2,10 @@
 // Deployer: maps components to threads, starts them on one epoch, and changes them while they run.
 #pragma once
 
-#include <atomic>
 #include <memory>
 
 #include "mauve_rt/base/barrier.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/run/shadow_thread.hpp"

@@ -21,7 +21,7 @@ class SimulatedClock final : public Clock {
   explicit SimulatedClock(time_ns_t now_ns) : now_ns_(now_ns) {}
   time_ns_t now_ns() const noexcept override { return now_ns_; }
   /// Nobody sleeps in a simulation: says that the instant was not reached. [rt]
-  bool sleep_until(time_ns_t, const std::atomic<std::uint32_t>&, std::uint32_t) const noexcept override {
+  bool sleep_until(time_ns_t, const Atomic<std::uint32_t>&, std::uint32_t) const noexcept override {
     return false;
   }
   void spend(time_ns_t declared_ns) const noexcept override { now_ns_ = later_by(now_ns_, declared_ns); }

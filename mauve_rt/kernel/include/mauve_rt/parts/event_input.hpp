@@ -2,12 +2,12 @@
 // EventInput: where an event wait learns that its port's resource was written.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <optional>
 #include <span>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/waiter.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/data/resource.hpp"
@@ -67,10 +67,10 @@ class EventInput final : public EventListener {
   bool is_for_the_same(const EventInput& other) const MAUVE_RT;
 
   PortBase* port_;
-  std::atomic<Waiter*> waiter_{nullptr};
+  Atomic<Waiter*> waiter_{nullptr};
   Resource* resource_{nullptr};
-  std::atomic<time_ns_t> time_{kNone};
-  std::atomic<bool> is_live_{true};
+  Atomic<time_ns_t> time_{kNone};
+  Atomic<bool> is_live_{true};
 };
 
 }  // namespace mauve

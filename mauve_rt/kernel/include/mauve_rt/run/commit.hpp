@@ -2,13 +2,13 @@
 // Commit: one change of N components that takes effect at one logical instant, without a meeting.
 #pragma once
 
-#include <atomic>
 #include <exception>
 #include <optional>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/run/cut.hpp"
 
@@ -80,9 +80,9 @@ struct Participant {
   bool left_behind{false};  // to be removed, while its thread still runs a timed-out execution
   bool has_voted{false};
 
-  std::atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in
-  std::atomic<bool> has_agreed{false};        // it has voted, for a message
-  std::atomic<time_ns_t> visit_ns{0};         // when its adopt or take began; 0: neither is under way
+  Atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in
+  Atomic<bool> has_agreed{false};        // it has voted, for a message
+  Atomic<time_ns_t> visit_ns{0};         // when its adopt or take began; 0: neither is under way
 
   time_ns_t parked_ns{0};   // the visit in which it took the change began
   time_ns_t armed_ns{0};    // ... and ended
@@ -94,11 +94,11 @@ struct Participant {
   time_ns_t resumes_ns{0};     // the instant that it goes on at
   time_ns_t grid_place_ns{0};  // where that belongs within a period (Machine::grid_place_ns)
   time_ns_t shift_ns{0};       // by which a new epoch makes its instants later
-  std::atomic<bool> passed{false};
+  Atomic<bool> passed{false};
 
   time_ns_t release_nominal_ns{0};  // of the release that follows
   time_ns_t release_actual_ns{0};
-  std::atomic<std::uint32_t> released{0};
+  Atomic<std::uint32_t> released{0};
 
   /// What its adopts and takes declare to need together; 0: nothing is declared. [rt]
   time_ns_t declared_ns() const MAUVE_RT {
@@ -283,7 +283,7 @@ class Commit {
   std::vector<CommitAction*> actions_;
   bool yields_{false};
   bool is_structural_{false};
-  std::atomic<bool> has_own_{false};
+  Atomic<bool> has_own_{false};
   time_ns_t timeout_ns_{0};
   const Task* unfit_{nullptr};
   const Task* locked_out_{nullptr};    // whose command lasted
@@ -293,14 +293,14 @@ class Commit {
   bool adopt_was_late_{false};
   std::exception_ptr refusal_{};
   const CommitAction* refused_by_{nullptr};
-  std::atomic<bool> is_refused_{false};
-  std::atomic<bool> answered_{false};
-  std::atomic<Off> off_{Off::not_yet};
-  std::atomic<const Task*> off_by_{nullptr};
+  Atomic<bool> is_refused_{false};
+  Atomic<bool> answered_{false};
+  Atomic<Off> off_{Off::not_yet};
+  Atomic<const Task*> off_by_{nullptr};
   alignas(64) Cut cut_{};
-  std::atomic<std::uint32_t> to_vote_{0};
-  std::atomic<std::uint32_t> to_pass_{0};
-  alignas(64) std::atomic<std::uint32_t> decided_{0};  // a line of its own: the requester sleeps on it
+  Atomic<std::uint32_t> to_vote_{0};
+  Atomic<std::uint32_t> to_pass_{0};
+  alignas(64) Atomic<std::uint32_t> decided_{0};  // a line of its own: the requester sleeps on it
 };
 
 }  // namespace mauve

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -116,7 +116,7 @@ class CommitGate {
   void call_off_if_unwanted(Commit& commit) MAUVE_RT MAUVE_REQUIRES(mutex_);
 
   PiMutex mutex_;
-  std::atomic<std::uint32_t> structure_{0};
+  Atomic<std::uint32_t> structure_{0};
   Commit* under_way_ MAUVE_GUARDED_BY(mutex_){nullptr};     // a list
   UrgentCommit* urgent_ MAUVE_GUARDED_BY(mutex_){nullptr};  // a list
   bool is_open_ MAUVE_GUARDED_BY(mutex_){false};
@@ -167,7 +167,7 @@ class ChangeMark {
   void set_since_ns(time_ns_t instant_ns) MAUVE_RT { since_ns_ = instant_ns; }
 
  private:
-  std::atomic<std::uint32_t> changes_{0};
+  Atomic<std::uint32_t> changes_{0};
   std::uint32_t unsettled_{0};
   bool is_claimed_{false};
   bool is_held_{false};

@@ -2,7 +2,6 @@
 // Component: a shell, a core and an fsm, run by a task; each can be replaced while it runs.
 #pragma once
 
-#include <atomic>
 #include <functional>
 #include <map>
 #include <memory>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/run/change_lock.hpp"
@@ -430,14 +430,14 @@ class Component final : public Configurable {
   void check_fallback(const Shell& shell, const FsmBase& fsm) const;
 
   std::string name_;
-  std::atomic<Architecture*> architecture_{nullptr};
+  Atomic<Architecture*> architecture_{nullptr};
   Task task_;
   ChangeMark change_mark_;
   Parts parts_;
   std::shared_ptr<const Wires> wires_{std::make_shared<const Wires>()};
-  std::atomic<Shell*> present_shell_{nullptr};
-  std::atomic<CoreBase*> present_core_{nullptr};
-  std::atomic<const FsmBase*> present_fsm_{nullptr};
+  Atomic<Shell*> present_shell_{nullptr};
+  Atomic<CoreBase*> present_core_{nullptr};
+  Atomic<const FsmBase*> present_fsm_{nullptr};
   CoreBinding binding_;
   std::string declared_core_;
   std::vector<std::string> alternatives_;
@@ -446,17 +446,16 @@ class Component final : public Configurable {
   std::unique_ptr<CoreBase> fallback_core_;  // until it is put in
   std::string fallback_name_;
   std::unique_ptr<PartsChange> fallback_;
-  std::atomic<bool> is_renewing_{false};
+  Atomic<bool> is_renewing_{false};
   std::weak_ptr<Component> self_;
 
   mutable Mutex shown_mutex_;
   ShownParts shown_ MAUVE_GUARDED_BY(shown_mutex_);
-  std::atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
+  Atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
   std::shared_ptr<const StateTimes> shown_times_ MAUVE_GUARDED_BY(shown_mutex_);
   std::vector<DescribedState> shown_states_ MAUVE_GUARDED_BY(shown_mutex_);
   std::shared_ptr<Probation> probation_ MAUVE_GUARDED_BY(shown_mutex_);
-  std::atomic<Probation*> next_probation_{
-      nullptr};  // of a change that is not settled; cleared under shown_mutex_
+  Atomic<Probation*> next_probation_{nullptr};  // of a change that is not settled; cleared under shown_mutex_
   std::optional<ProbationRecord> last_probation_ MAUVE_GUARDED_BY(shown_mutex_);
   std::shared_ptr<Shadow> shadow_ MAUVE_GUARDED_BY(shown_mutex_);
 };

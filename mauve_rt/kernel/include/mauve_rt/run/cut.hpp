@@ -2,10 +2,10 @@
 // The cut of a change: one atomic word that says whether it is made, and from which instant on.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -86,7 +86,7 @@ class Cut {
                                        std::memory_order_acquire);
   }
 
-  std::atomic<std::uint64_t> word_;
+  Atomic<std::uint64_t> word_;
 };
 
 }  // namespace mauve

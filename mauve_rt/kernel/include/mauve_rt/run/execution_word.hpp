@@ -2,11 +2,11 @@
 // Who ends an execution: the thread that runs it, or who times it out. One atomic word decides.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <optional>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -178,9 +178,9 @@ class ExecutionWord {
     futex_wake_all(word_);
   }
 
-  std::atomic<std::uint32_t> word_{kIdle};
-  std::atomic<time_ns_t> began_ns_{0};
-  std::atomic<time_ns_t> limit_ns_{0};
+  Atomic<std::uint32_t> word_{kIdle};
+  Atomic<time_ns_t> began_ns_{0};
+  Atomic<time_ns_t> limit_ns_{0};
 };
 
 }  // namespace mauve

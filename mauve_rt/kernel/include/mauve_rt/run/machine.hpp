@@ -3,7 +3,6 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <cstdint>
 #include <exception>
 #include <optional>
@@ -11,6 +10,7 @@
 
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/present_state.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/statistics.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/base/trace.hpp"
@@ -230,17 +230,17 @@ class Machine {
   TraceRing* ring_{nullptr};
   const FsmBase* fsm_{nullptr};
   CoreBinding* core_{nullptr};
-  std::atomic<time_ns_t> reference_ns_{0};
-  std::atomic<time_ns_t> deployment_ns_{0};  // the reference of the deployment's grid
-  std::atomic<time_ns_t> period_ns_{0};
-  std::atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
+  Atomic<time_ns_t> reference_ns_{0};
+  Atomic<time_ns_t> deployment_ns_{0};  // the reference of the deployment's grid
+  Atomic<time_ns_t> period_ns_{0};
+  Atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
 
   Context context_;
   TaskStatistics statistics_;
   TaskListening listening_;
-  std::atomic<std::uint32_t> current_{0};
-  std::atomic<time_ns_t> released_ns_{0};
-  std::atomic<time_ns_t> entered_ns_{0};
+  Atomic<std::uint32_t> current_{0};
+  Atomic<time_ns_t> released_ns_{0};
+  Atomic<time_ns_t> entered_ns_{0};
   ExecutionWord execution_;
   PresentState present_;
 

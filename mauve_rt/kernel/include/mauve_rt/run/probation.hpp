@@ -2,7 +2,6 @@
 // Probation: a new core, or a new fsm and core, on trial, with the old parts ready to go back in.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/number_place.hpp"
@@ -236,7 +236,7 @@ class Probation : public std::enable_shared_from_this<Probation> {
   const std::uint32_t trace_id_;
   std::vector<std::unique_ptr<PortLimits>> limits_;
 
-  std::atomic<std::uint32_t> phase_{kPrepared};
+  Atomic<std::uint32_t> phase_{kPrepared};
   PartsChange* parts_{nullptr};
   std::unique_ptr<PartsChange> kept_;
   time_ns_t begin_ns_{0};
@@ -248,9 +248,9 @@ class Probation : public std::enable_shared_from_this<Probation> {
   std::shared_ptr<const std::string> fault_;
   time_ns_t fault_bound_ns_{0};
   std::uint32_t fault_where_{0};
-  std::atomic<std::int64_t> releases_{0};
-  std::atomic<bool> is_requested_{false};
-  std::atomic<bool> is_comeback_claimed_{false};
+  Atomic<std::int64_t> releases_{0};
+  Atomic<bool> is_requested_{false};
+  Atomic<bool> is_comeback_claimed_{false};
   mutable Mutex request_mutex_;
   std::string request_ MAUVE_GUARDED_BY(request_mutex_){};
   std::string left_out_ MAUVE_GUARDED_BY(request_mutex_){};  // why the old core does not go on

@@ -2,7 +2,6 @@
 // Shadow: a candidate core that executes in parallel with a component's live core, on the same inputs, without effects.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <string>
@@ -10,6 +9,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/parts/core.hpp"
@@ -192,9 +192,9 @@ class Shadow {
   ShadowCapture capture_;
   std::shared_ptr<ShadowSignal> signal_{};
 
-  std::atomic<std::uint32_t> phase_{kPrepared};
-  std::atomic<time_ns_t> executing_since_ns_{0};
-  std::atomic<bool> is_settled_{false};
+  Atomic<std::uint32_t> phase_{kPrepared};
+  Atomic<time_ns_t> executing_since_ns_{0};
+  Atomic<bool> is_settled_{false};
   time_ns_t begin_ns_{0};
   time_ns_t ended_ns_{0};
   ShadowCause cause_{ShadowCause::none};

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/port_base.hpp"
 #include "mauve_rt/parts/shell.hpp"
@@ -100,11 +100,11 @@ class ShadowCapture {
   std::uint64_t number_{0};
   std::int64_t from_{kStart};
   bool is_anew_{true};  // no release has told it yet
-  std::atomic<std::uint64_t> filled_{0};
-  std::atomic<std::uint64_t> emptied_{0};
-  std::atomic<std::uint64_t> captured_{0};
-  std::atomic<std::uint64_t> skipped_{0};
-  std::atomic<bool> is_attached_{false};
+  Atomic<std::uint64_t> filled_{0};
+  Atomic<std::uint64_t> emptied_{0};
+  Atomic<std::uint64_t> captured_{0};
+  Atomic<std::uint64_t> skipped_{0};
+  Atomic<bool> is_attached_{false};
 };
 
 }  // namespace mauve

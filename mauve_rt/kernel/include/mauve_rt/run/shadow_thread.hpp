@@ -2,12 +2,12 @@
 // ShadowThreads: ordinary threads, below all components, that execute the shadows of a host.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
 
@@ -22,8 +22,8 @@ class Shadow;
 /// | word (futex) | who has news       | the sleeper     | seq_cst with is_asleep: one of the two sees the other's        |
 /// | is_asleep    | the sleeper        | who has news    | seq_cst: as above                                              |
 struct ShadowSignal {
-  std::atomic<std::uint32_t> word{0};
-  std::atomic<bool> is_asleep{false};
+  Atomic<std::uint32_t> word{0};
+  Atomic<bool> is_asleep{false};
 
   /// [rt]
   void bump() MAUVE_RT {

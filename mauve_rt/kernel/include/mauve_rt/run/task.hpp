@@ -4,7 +4,6 @@
 
 #include <pthread.h>
 
-#include <atomic>
 #include <memory>
 #include <optional>
 #include <span>
@@ -15,6 +14,7 @@
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
@@ -54,7 +54,7 @@ struct FaultNote {
 /// Shared by all tasks of a deployment: bumped on every change of a component's state.
 /// A component not listed yet has nobody to tell.
 struct ChangeSignal {
-  std::atomic<std::uint32_t> word{0};
+  Atomic<std::uint32_t> word{0};
   RevocableReference<ChangeSignal> listener;
 
   /// Who else is told from now on; nullptr: nobody, and who was told before is told no more on return. [non-rt]
@@ -266,8 +266,7 @@ class Task final : public Waiter {
   static const Task* executing_here() MAUVE_RT;
   /// By who runs a simulated task, around it; nullptr: none. [rt]
   static void set_simulated_here(const Task* task) MAUVE_RT;
-  void await(const std::atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns)
-      MAUVE_RT override;
+  void await(const Atomic<std::uint32_t>& word, std::uint32_t number, time_ns_t until_ns) MAUVE_RT override;
   void signal_awaited() MAUVE_RT override;
   bool is_to_stop() const MAUVE_RT override {
     return (control_.load(std::memory_order_acquire) & (kStop | kExit)) != 0;
@@ -438,41 +437,41 @@ class Task final : public Waiter {
   Mutex ring_mutex_;
   std::unique_ptr<TraceRing> ring_;
 
-  std::atomic<Shell*> shell_{nullptr};
+  Atomic<Shell*> shell_{nullptr};
   CoreBinding* core_{nullptr};
 
   PiMutex command_mutex_;
   PiMutex order_mutex_;
   Thread thread_;
   Barrier* barrier_{nullptr};
-  std::atomic<bool> has_thread_{false};
+  Atomic<bool> has_thread_{false};
   bool simulated_{false};
   ThreadFacts facts_;
   mutable PiMutex fault_mutex_;
   FaultNote fault_ MAUVE_GUARDED_BY(fault_mutex_);
   FaultNote time_out_note_;  // of an execution that timed out, then the fault before it; empty while none has
   std::shared_ptr<Watchdog> watchdog_;  // outlives what its thread may still tell it
-  const std::atomic<int>* locks_held_{nullptr};
+  const Atomic<int>* locks_held_{nullptr};
   bool demoted_{false};
 
-  alignas(64) std::atomic<std::uint32_t> control_{0};
-  std::atomic<std::uint32_t> state_{static_cast<std::uint32_t>(ComponentState::unconfigured)};
-  std::atomic<std::uint32_t> parked_{1};
-  std::atomic<std::uint32_t> ready_{0};
-  std::atomic<std::uint32_t> ended_{0};
-  std::atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
+  alignas(64) Atomic<std::uint32_t> control_{0};
+  Atomic<std::uint32_t> state_{static_cast<std::uint32_t>(ComponentState::unconfigured)};
+  Atomic<std::uint32_t> parked_{1};
+  Atomic<std::uint32_t> ready_{0};
+  Atomic<std::uint32_t> ended_{0};
+  Atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
-  std::atomic<std::uint32_t> slot_{kEmpty};
-  std::atomic<Participant*> participant_{nullptr};
-  std::atomic<bool> removed_{false};
-  std::atomic<time_ns_t> taken_ns_{0};  // T of the last change that it has taken
+  Atomic<std::uint32_t> slot_{kEmpty};
+  Atomic<Participant*> participant_{nullptr};
+  Atomic<bool> removed_{false};
+  Atomic<time_ns_t> taken_ns_{0};  // T of the last change that it has taken
   time_ns_t start_at_ns_{0};
   static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
-  std::atomic<std::uint32_t> outputs_{kAllWritten};
-  std::atomic<Participant*> awaiting_release_{nullptr};
-  std::atomic<CommitAction*> fallback_{nullptr};
-  std::atomic<bool> is_falling_back_{false};
-  std::atomic<bool> fallen_back_{false};
+  Atomic<std::uint32_t> outputs_{kAllWritten};
+  Atomic<Participant*> awaiting_release_{nullptr};
+  Atomic<CommitAction*> fallback_{nullptr};
+  Atomic<bool> is_falling_back_{false};
+  Atomic<bool> fallen_back_{false};
   RevocableReference<Probation> probation_;
   RevocableReference<Shadow> shadow_;
 

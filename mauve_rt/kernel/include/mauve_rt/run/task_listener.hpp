@@ -2,11 +2,11 @@
 // Who is told, where it happens, of what befalls one component.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 
 #include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -71,8 +71,8 @@ class TaskListening {
   }
 
  private:
-  std::atomic<time_ns_t> late_from_ns_{kForever};
-  std::atomic<time_ns_t> response_from_ns_{kForever};
+  Atomic<time_ns_t> late_from_ns_{kForever};
+  Atomic<time_ns_t> response_from_ns_{kForever};
   RevocableReference<TaskListener> listener_;
 };
 

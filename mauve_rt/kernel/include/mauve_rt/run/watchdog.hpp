@@ -2,11 +2,11 @@
 // The watchdog: finds states that last longer than they declared, while they last. It does not poll.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <vector>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/base/time.hpp"
@@ -72,11 +72,11 @@ class Watchdog {
   bool runs_{false};
   PiMutex tasks_mutex_;
   std::vector<Task*> tasks_ MAUVE_GUARDED_BY(tasks_mutex_);
-  std::atomic<time_ns_t> wake_before_ns_{kForever};
-  std::atomic<std::uint32_t> alarm_{0};
-  std::atomic<std::uint32_t> left_{0};
-  std::atomic<std::uint32_t> ending_{0};
-  std::atomic<std::uint64_t> looks_{0};
+  Atomic<time_ns_t> wake_before_ns_{kForever};
+  Atomic<std::uint32_t> alarm_{0};
+  Atomic<std::uint32_t> left_{0};
+  Atomic<std::uint32_t> ending_{0};
+  Atomic<std::uint64_t> looks_{0};
 };
 
 }  // namespace mauve

@@ -2,7 +2,6 @@
 // Actions: what a rule does or undoes, kept ready while it may be wanted.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
@@ -10,6 +9,7 @@
 
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/value.hpp"
 #include "mauve_rt/change/prepared_transaction.hpp"
 #include "mauve_rt/deploy/host.hpp"
@@ -120,7 +120,7 @@ class Action {
   std::string problem_;
   std::uint64_t tried_at_{0};  // the revision; 0: not yet
   Ended how_{Ended::done};
-  std::atomic<Stage> stage_{Stage::idle};
+  Atomic<Stage> stage_{Stage::idle};
 };
 
 }  // namespace mauve::rules

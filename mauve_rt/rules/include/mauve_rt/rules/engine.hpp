@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/rules/condition.hpp"
 #include "mauve_rt/rules/decision.hpp"
@@ -91,7 +91,7 @@ class Engine {
   /// One for each condition that listens, in the order of the rules. [non-rt]
   const std::vector<Heard>& signals() const noexcept { return heard_; }
   /// Bumped by what is of interest. [rt]
-  const std::atomic<std::uint32_t>& word() const MAUVE_RT { return word_; }
+  const Atomic<std::uint32_t>& word() const MAUVE_RT { return word_; }
   /// Lets the decision thread look. Any thread. [rt]
   void wake() MAUVE_RT;
 
@@ -171,10 +171,10 @@ class Engine {
   std::vector<Life*> by_rank_;  // the highest first
   std::optional<PendingAction> pending_;
   std::array<Decision, kRing> ring_{};
-  alignas(64) std::atomic<std::uint32_t> word_{0};
-  alignas(64) std::atomic<std::uint64_t> told_{0};
-  alignas(64) std::atomic<std::uint64_t> taken_{0};
-  std::atomic<std::uint64_t> lost_{0};
+  alignas(64) Atomic<std::uint32_t> word_{0};
+  alignas(64) Atomic<std::uint64_t> told_{0};
+  alignas(64) Atomic<std::uint64_t> taken_{0};
+  Atomic<std::uint64_t> lost_{0};
 };
 
 }  // namespace mauve::rules

@@ -2,13 +2,13 @@
 // Reserve: what a rule does where its `do` does not come about.
 #pragma once
 
-#include <atomic>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/rules/engine.hpp"
@@ -67,7 +67,7 @@ class Reserve {
 
   const ReserveKind kind_;
   const std::vector<std::string> components_;
-  std::atomic<Stage> stage_{Stage::idle};
+  Atomic<Stage> stage_{Stage::idle};
   bool has_failed_{false};
 };
 

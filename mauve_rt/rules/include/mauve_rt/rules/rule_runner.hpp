@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <deque>
 #include <map>
 #include <memory>
@@ -11,6 +10,7 @@
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/condition_variable.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
 #include "mauve_rt/deploy/host.hpp"
@@ -122,11 +122,11 @@ class RuleRunner {
     Worker commits;
     Worker prepares;
     Worker reserves;
-    std::uint32_t name{0};                // in the trace
-    std::atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
-    std::atomic<std::uint64_t> ends{0};   // of actions of this rule, and of those that contend with it
-    std::atomic<bool> in_effect{false};
-    std::atomic<bool> may_prepare{true};
+    std::uint32_t name{0};           // in the trace
+    Atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
+    Atomic<std::uint64_t> ends{0};   // of actions of this rule, and of those that contend with it
+    Atomic<bool> in_effect{false};
+    Atomic<bool> may_prepare{true};
     bool has_ended{false};  // an action of it, in this step of the decision thread
     RuleStatus status{};
     std::uint64_t applied{0};  // of found, by the decision thread
@@ -168,7 +168,7 @@ class RuleRunner {
   std::vector<std::unique_ptr<Rule>> rules_;
   Feeds feeds_;
   ChangeSignal work_;
-  std::atomic<std::uint32_t> ending_{0};
+  Atomic<std::uint32_t> ending_{0};
   Thread decision_thread_;
   Thread follower_;
   std::uint64_t made_{0};      // the follower's: how many decisions

@@ -2,7 +2,6 @@
 // Signals: what the conditions of rules hear.
 #pragma once
 
-#include <atomic>
 #include <compare>
 #include <cstdint>
 #include <limits>
@@ -10,6 +9,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -76,7 +76,7 @@ class Signal {
   };
 
   /// `word` is bumped, and who sleeps on it woken, by what is of interest; it outlives the signal. [setup]
-  explicit Signal(std::atomic<std::uint32_t>& word) : word_(word) {}
+  explicit Signal(Atomic<std::uint32_t>& word) : word_(word) {}
   Signal(const Signal&) = delete;
   Signal& operator=(const Signal&) = delete;
 
@@ -127,23 +127,23 @@ class Signal {
 
    private:
     struct Place {
-      std::atomic<time_ns_t> time_ns{0};
-      std::atomic<double> value{0.0};
-      std::atomic<std::uint64_t> count{0};
+      Atomic<time_ns_t> time_ns{0};
+      Atomic<double> value{0.0};
+      Atomic<std::uint64_t> count{0};
     };
-    std::atomic<std::uint64_t> count_{0};
+    Atomic<std::uint64_t> count_{0};
     Place places_[2];  // NOLINT(modernize-avoid-c-arrays): atomics, which std::array would have to copy
   };
 
-  std::atomic<std::uint32_t>& word_;
+  Atomic<std::uint32_t>& word_;
   Record all_, entered_, left_;
   Bounds inner_, outer_;
   bool counts_crossings_{false};
   bool is_outside_{false};
   std::uint64_t crossings_{0};
-  std::atomic<time_ns_t> reported_ns_{kForever};
-  std::atomic<double> low_{std::numeric_limits<double>::infinity()};
-  std::atomic<double> high_{-std::numeric_limits<double>::infinity()};
+  Atomic<time_ns_t> reported_ns_{kForever};
+  Atomic<double> low_{std::numeric_limits<double>::infinity()};
+  Atomic<double> high_{-std::numeric_limits<double>::infinity()};
 };
 
 }  // namespace mauve::rules

@@ -2,11 +2,11 @@
 // Worker: a thread that does one job each time that it is asked to.
 #pragma once
 
-#include <atomic>
 #include <cstdint>
 #include <functional>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
 
 namespace mauve::rules {
@@ -39,7 +39,7 @@ class Worker {
 
   Thread thread_;
   std::function<void()> job_;
-  std::atomic<std::uint32_t> asked_{0};
+  Atomic<std::uint32_t> asked_{0};
   bool runs_{false};
 };
 

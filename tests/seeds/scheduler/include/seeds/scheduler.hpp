@@ -11,14 +11,13 @@
 #include "mauve_rt/base/seam/clocks.hpp"
 
 /// Each thread is a thread of the system that waits for the baton on a semaphore of its own; the holder of the baton runs.
-/// The baton changes hands inside calls of the seam alone. The seed decides who is next, what a call costs in virtual time, how
+/// The baton changes hands inside calls of the seam and at atomic operations (Atomic). The seed decides who is next, what a call costs in virtual time, how
 /// late a sleeper wakes, and when the whole computer stalls. Nothing depends on an address, on a hash or on the real clock.
 ///
-/// A thread that waits for another one by no call of the seam would keep the baton for ever: no atomic operation is a possible
-/// switch so far.
+/// A thread that waits for another one by neither would keep the baton for ever.
 namespace mauve::seeds {
 
-/// A call of the seam, as the trace has it.
+/// A call of the seam, as the trace has it; an atomic operation only where threads may have switched.
 enum class Call : std::uint8_t {
   begin,
   clock,
@@ -40,6 +39,8 @@ enum class Call : std::uint8_t {
   thread_end,
   signal_wait,
   stall,
+  atomic,
+  compute,
 };
 const char* to_string(Call call) noexcept;
 
@@ -61,6 +62,8 @@ struct Outcome {
   bool operator==(const Outcome&) const = default;
 };
 
+/// What the first stack trace and the first exception of a process load is loaded here, not in each forked process.
+void prepare_forks() noexcept;
 /// Begins a run, with the calling thread as the first one. Once in a process, before the seam makes any thread.
 void begin(const Options& options);
 Outcome outcome() noexcept;
@@ -70,6 +73,9 @@ std::string alive();
 const char* running() noexcept;
 /// One line a call: instant, thread, call.
 void write_trace(const std::string& path);
+
+/// The calling thread uses the processor for so long: for a scenario, which would loop over many readings of a clock otherwise.
+void compute(time_ns_t length_ns) noexcept;
 
 // ---- for the seam
 
