@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-3.0-or-later
-"""Write a copy of the sources of kernel and rules in which each fault of the tables stands behind a run-time switch.
+"""Write a copy of the sources of kernel and rules with each fault of the tables behind a run-time switch.
 
     plant.py --source ROOT --to FOLDER --table mutants.yaml [--table more.yaml]
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Whether the seeds find planted faults: runs the seeds with one mutant after the other, each up to the first bad run.
 // MAUVE_MUTANT asks for one number or for a range (17, 1-20), MAUVE_SEEDS for so many seeds, MAUVE_WRITE_FOUND for a new found.txt.
+#include <fcntl.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -100,12 +102,14 @@ std::string reason(const Run& run, const std::string& errors) {
 struct Found {
   std::uint64_t seed{0};  // 0: none
   std::string reason{};
+  long reached{0};  // how often the runs came to the mutant
 };
 
 /// The first seed whose run is bad with this mutant.
 Found find(int number, std::uint64_t seeds) {
   StandardError errors;
   seeds::planted_number = number;
+  *seeds::reached = 0;
   Found found;
   for (std::uint64_t seed = 1; seed <= seeds && found.seed == 0; ++seed) {
     const Run run = seeds::run_forked(random_architecture, seed);
@@ -114,6 +118,10 @@ Found find(int number, std::uint64_t seeds) {
     if (!is_good) found = {.seed = seed, .reason = reason(run, text)};
   }
   seeds::planted_number = 0;
+  found.reached = *seeds::reached;
+  if (found.seed == 0 && number != 0)
+    found.reason =
+        found.reached == 0 ? "never reached" : "reached " + std::to_string(found.reached) + " times";
   return found;
 }
 
@@ -146,6 +154,18 @@ std::map<int, std::string> read_found() {
   return rows;
 }
 
+/// Several of this program may run at once, each for a range.
+class FoundLock {
+ public:
+  FoundLock() : file_(open(MAUVE_FOUND, O_CREAT | O_RDWR | O_CLOEXEC, 0644)) { flock(file_, LOCK_EX); }
+  ~FoundLock() { close(file_); }
+  FoundLock(const FoundLock&) = delete;
+  FoundLock& operator=(const FoundLock&) = delete;
+
+ private:
+  int file_;
+};
+
 void write_found(const std::map<int, std::string>& rows) {
   std::ofstream file(MAUVE_FOUND);
   file << kHeader;
@@ -156,7 +176,14 @@ void write_found(const std::map<int, std::string>& rows) {
   }
 }
 
+/// Memory that the children have in common with this process.
+void share_reached() {
+  void* const page = mmap(nullptr, sizeof(long), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  if (page != MAP_FAILED) seeds::reached = static_cast<long*>(page);
+}
+
 int run() {
+  share_reached();
   int first = 0;
   int last = kMutants.empty() ? 0 : kMutants.back().number;
   if (const std::string asked = seeds::variable("MAUVE_MUTANT"); !asked.empty()) {
@@ -181,6 +208,7 @@ int run() {
     std::fflush(stdout);
     failures += found.seed == 0 ? 1 : 0;
     if (writes) {
+      const FoundLock lock;
       std::map<int, std::string> rows = read_found();
       rows[mutant.number] = line;
       write_found(rows);

@@ -9,9 +9,15 @@ namespace mauve::seeds {
 /// The number of the mutant; 0: the sources as they are. Set before any thread is made.
 inline int planted_number = 0;
 
+/// How often a run came to the place of the mutant; test_mutants shares it with its children.
+inline long own_reached = 0;
+inline long* reached = &own_reached;
+
 /// The sources that plant.py writes call this function. An expression that the compiler evaluates has no fault.
 constexpr bool is_planted(int number) noexcept {
-  return !std::is_constant_evaluated() && planted_number == number;
+  if (std::is_constant_evaluated() || planted_number != number) return false;
+  ++*reached;
+  return true;
 }
 
 }  // namespace mauve::seeds
