@@ -72,7 +72,7 @@ class StandardError {
 
 /// A contract that is broken in a component's own code ends in a fault of the component, as any exception there: the run itself
 /// may go on.
-constexpr const char* kBrokenContract = "mauve_rt: broken";
+constexpr const char* kBrokenContract = ": broken ";
 
 std::string line_with(const std::string& text, std::size_t at) {
   const std::size_t begin = text.rfind('\n', at) + 1;
@@ -82,7 +82,7 @@ std::string line_with(const std::string& text, std::size_t at) {
 /// What was wrong with a run, in one line.
 std::string reason(const Run& run, const std::string& errors) {
   if (const std::size_t broken = errors.find(kBrokenContract); broken != std::string::npos)
-    return line_with(errors, broken).substr(std::string("mauve_rt: ").size());
+    return line_with(errors, broken);
   std::istringstream findings(run.text);
   for (std::string line; std::getline(findings, line);) {
     if (line.starts_with("  at ")) return line.substr(2);
