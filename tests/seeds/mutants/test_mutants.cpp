@@ -119,9 +119,11 @@ Found find(int number, std::uint64_t seeds) {
   }
   seeds::planted_number = 0;
   found.reached = *seeds::reached;
-  if (found.seed == 0 && number != 0)
+  if (found.seed == 0 && number != 0) {
     found.reason =
-        found.reached == 0 ? "never reached" : "reached " + std::to_string(found.reached) + " times";
+        (found.reached == 0 ? "never reached" : "reached " + std::to_string(found.reached) + " times") +
+        " in " + std::to_string(seeds) + " seeds";
+  }
   return found;
 }
 
