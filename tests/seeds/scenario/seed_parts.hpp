@@ -156,9 +156,7 @@ class SeedCore : public Core<TestShell> {
   void expect(bool is_true, const std::string& what) const { expect(is_true, what.c_str()); }
 
   void compute(time_ns_t most_ns) noexcept {
-    const time_ns_t until_ns = monotonic_now_ns() + dice_.between(0, most_ns);
-    while (monotonic_now_ns() < until_ns) {
-    }
+    seeds::compute(dice_.between(0, most_ns));
   }
   /// False: it refuses. Does nothing in other hooks than its own.
   bool behave(Hook hook) {
