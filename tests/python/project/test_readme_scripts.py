@@ -17,8 +17,7 @@ def test_every_folder_of_tests_is_a_stage() -> None:
         folders = {file.relative_to(tests).parts[0] for file in tests.glob("*/**/test_*.*")}
         assert folders
         by_ctest = {"models", "rules"}  # all in the stage kernel
-        by_hand = {"seeds"}  # a build of its own: CONTRIBUTING.md
-        assert folders <= {*stages[1].split(), *by_ctest, *by_hand}
+        assert folders <= {*stages[1].split(), *by_ctest}
 
 
 def test_ci_runs_every_tool_and_every_test() -> None:
