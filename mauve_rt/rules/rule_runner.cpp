@@ -166,8 +166,9 @@ time_ns_t RuleRunner::advance() {
 // ---- the decision thread
 
 void RuleRunner::run_decisions() noexcept {
-  while (ending_.load(std::memory_order_acquire) == 0) {
-    const std::uint32_t word = engine_->word().load(std::memory_order_acquire);  // before the look
+  for (;;) {
+    const std::uint32_t word = engine_->word().load(std::memory_order_acquire);  // before each look
+    if (ending_.load(std::memory_order_acquire) != 0) return;
     const time_ns_t next_ns = step();
     futex_wait_until(engine_->word(), word, next_ns);
   }
@@ -366,8 +367,9 @@ void RuleRunner::deliver(Rule& rule, Act act, ActionReport report) {
 // ---- the follower
 
 void RuleRunner::run_follower() noexcept {
-  while (ending_.load(std::memory_order_acquire) == 0) {
-    const std::uint32_t seen = work_.word.load(std::memory_order_acquire);
+  for (;;) {
+    const std::uint32_t seen = work_.word.load(std::memory_order_acquire);  // before each look
+    if (ending_.load(std::memory_order_acquire) != 0) return;
     if (look_around()) engine_->wake();
     tell();
     futex_wait_until(work_.word, seen, kForever);

@@ -200,8 +200,9 @@ void TransactionCommit::Work::require_host_open() const {
 /// Either a shutdown sees the threads of what was added, and gets those of what was changed, or they end here.
 void TransactionCommit::Work::settle_with_host() {
   if (!deployed_ || host_->is_deployed()) return;
-  for (DraftComponent* added : prepared_added_) host_->detach(*added->component);
-  for (const Change& change : changes_) host_->detach(*change.draft->component);
+  const time_ns_t until_ns = monotonic_now_ns() + Runner::kThreadEnd;  // of all, however many hang
+  for (DraftComponent* added : prepared_added_) host_->detach(*added->component, until_ns);
+  for (const Change& change : changes_) host_->detach(*change.draft->component, until_ns);
 }
 
 void TransactionCommit::Work::draft_steps() {
@@ -390,15 +391,16 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
   throw Error(ErrorCode::adopt_refused, what);
 }
 
-/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again. One that is late keeps
-/// its grid.
+/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again, also where a state of theirs
+/// still executes. One that is late keeps its grid.
 void TransactionCommit::Work::set_epoch() {
   if (!resynchronises_) return;
   const time_ns_t epoch_ns = later_by(commit_->instant_ns() - 1, kDeploymentLead);
   architecture_.set_deployment_epoch(epoch_ns);
   for (const auto& component : architecture_.components()) {
     Task& task = component->task();
-    if (!places_.contains(component->name()) && task.is_parked()) task.join(epoch_ns);
+    const bool is_at_rest = task.is_parked() || task.state() == ComponentState::faulted;
+    if (is_at_rest && !places_.contains(component->name())) task.join(epoch_ns);
   }
 }
 

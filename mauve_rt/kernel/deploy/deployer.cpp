@@ -13,8 +13,6 @@ namespace mauve {
 
 namespace {
 
-constexpr time_ns_t kJoinTimeout = ms_to_ns(500);
-
 /// The deployers of the process, for its end.
 struct Living {
   Mutex mutex;
@@ -140,7 +138,7 @@ void Deployer::shut_down() noexcept {
   architecture().commit_gate().close();
   stop_all(monotonic_now_ns() + kStopTimeout);
   give_up_hung();
-  const time_ns_t until = monotonic_now_ns() + kJoinTimeout;
+  const time_ns_t until = monotonic_now_ns() + kThreadEnd;
   const auto all = hosted();
   // The order to end goes to all at once: one that hangs delays no other.
   for (const auto& component : all) component->task().end_thread(0);
@@ -160,6 +158,6 @@ void Deployer::run_shadow(const std::shared_ptr<Shadow>& shadow) {
   if (is_deployed()) shadow_threads_.add(shadow);  // else the change finds the host shut down
 }
 
-bool Deployer::end_task(Task& task) noexcept { return task.end_thread(monotonic_now_ns() + kJoinTimeout); }
+bool Deployer::end_task(Task& task, time_ns_t until_ns) noexcept { return task.end_thread(until_ns); }
 
 }  // namespace mauve

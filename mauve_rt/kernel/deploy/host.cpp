@@ -193,8 +193,8 @@ void Host::attach(const std::shared_ptr<Component>& component) {
   note_hosted(component);
 }
 
-bool Host::detach(Component& component) noexcept {
-  if (!end_task(component.task())) return false;
+bool Host::detach(Component& component, time_ns_t until_ns) noexcept {
+  if (!end_task(component.task(), until_ns)) return false;
   const LockGuard lock(hosted_mutex_);
   std::erase_if(hosted_, [&](const auto& each) {
     const auto held = each.lock();

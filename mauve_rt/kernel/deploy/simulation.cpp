@@ -208,7 +208,7 @@ const RealtimeStatus& SimulatedHost::realtime_status() const noexcept {
 
 void SimulatedHost::begin_task(Task& task) { task.simulate(processor_.clock, simulation_.options_.trace); }
 
-bool SimulatedHost::end_task(Task& task) noexcept {
+bool SimulatedHost::end_task(Task& task, time_ns_t /*until_ns*/) noexcept {
   task.end_simulation();
   return true;
 }

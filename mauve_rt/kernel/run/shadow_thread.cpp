@@ -62,8 +62,9 @@ class ShadowThreads::One {
     Atomic<std::uint32_t> has_ended{0};
 
     void run() noexcept {
-      while (!is_to_end.load(std::memory_order_acquire) && !shadow->has_ended()) {
-        const std::uint32_t seen = signal->word.load(std::memory_order_seq_cst);  // before the look
+      for (;;) {
+        const std::uint32_t seen = signal->word.load(std::memory_order_seq_cst);  // before each look
+        if (is_to_end.load(std::memory_order_acquire) || shadow->has_ended()) break;
         if (!shadow->run_pending() && !shadow->has_ended()) sleep(seen);
       }
       if (shadow->has_ended()) shadow->retire();

@@ -84,8 +84,9 @@ void* Watchdog::write_entry(void* self) noexcept {
 }
 
 void Watchdog::run() noexcept {
-  while (ending_.load(std::memory_order_acquire) == 0) {
+  for (;;) {
     const std::uint32_t alarm = alarm_.load(std::memory_order_acquire);
+    if (ending_.load(std::memory_order_acquire) != 0) return;  // after the alarm: stop() sets both, this one first
     const time_ns_t looked_ns = monotonic_now_ns();
     const time_ns_t next_ns = look(looked_ns);
     if (!futex_wait_until(alarm_, alarm, next_ns)) continue;
@@ -124,8 +125,9 @@ Task* Watchdog::next_left(std::size_t& place) noexcept {
 }
 
 void Watchdog::write_left_outputs() noexcept {
-  while (ending_.load(std::memory_order_acquire) == 0) {
+  for (;;) {
     const std::uint32_t left = left_.load(std::memory_order_acquire);
+    if (ending_.load(std::memory_order_acquire) != 0) return;  // as in run()
     bool all_written = true;
     std::size_t place = 0;
     while (Task* task = next_left(place)) all_written &= task->write_outputs_left();

@@ -191,6 +191,24 @@ TYPED_TEST(Resynchronise, ThatIsRefusedChangesNothing) {
   EXPECT_EQ(before_ns, component.task().grid().reference_ns);
 }
 
+class ResynchroniseHung : public Deployed {};
+
+/// A component of its name that takes its place, or itself once it was repaired, starts on the new epoch.
+TEST_F(ResynchroniseHung, OneThatWasGivenUpTakesItToo) {
+  std::atomic<bool> may_end{false};
+  add("first");
+  Component& hung = add("hung");
+  core(hung).work = [&] {
+    while (!may_end) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  };
+  deploy();
+  wait_runs(hung, 1);
+  EXPECT_TRUE(deployer.stop("hung", StopOptions{.timeout_ns = 0, .force = true}));
+  deployer.commit(std::move(Transaction().resynchronise()));
+  EXPECT_EQ(architecture.deployment_epoch_ns(), hung.task().grid().reference_ns);
+  may_end = true;
+}
+
 TEST(ResynchroniseUndeployed, IsRefused) {
   Architecture architecture;
   architecture.add_component<TestShell, TestCore, TestFsm>("c");

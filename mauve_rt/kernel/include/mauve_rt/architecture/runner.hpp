@@ -6,6 +6,7 @@
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/base/seam/guards.hpp"
 #include "mauve_rt/base/seam/shared_mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
@@ -39,8 +40,10 @@ class Runner {
 
   /// Gives a parked component what it runs on. [non-rt] Throws Error.
   virtual void attach(const std::shared_ptr<Component>& component) = 0;
-  /// The reverse; false when its thread would not end in time. [non-rt]
-  virtual bool detach(Component& component) noexcept = 0;
+  /// How long the end of a thread is waited for.
+  static constexpr time_ns_t kThreadEnd = ms_to_ns(500);
+  /// The reverse; false when its thread has not ended by the instant. [non-rt]
+  virtual bool detach(Component& component, time_ns_t until_ns) noexcept = 0;
   /// Executes the releases of a shadow, once it has begun, until it has ended. [non-rt] Throws Error.
   virtual void run_shadow(const std::shared_ptr<Shadow>& shadow) = 0;
   /// Held while a change uses the runner, which may end meanwhile where this owns nothing. [non-rt], the architecture's change

@@ -54,7 +54,7 @@ class Deployer final : public Host {
 
  protected:
   void begin_task(Task& task) override;
-  bool end_task(Task& task) noexcept override;
+  bool end_task(Task& task, time_ns_t until_ns) noexcept override;
 
  private:
   void create_threads();

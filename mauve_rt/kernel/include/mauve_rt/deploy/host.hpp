@@ -112,7 +112,7 @@ class Host : public Runner {
   std::uint32_t wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept;
 
   void attach(const std::shared_ptr<Component>& component) final;
-  bool detach(Component& component) noexcept final;
+  bool detach(Component& component, time_ns_t until_ns) noexcept final;
 
  protected:
   /// Throws Error: not_configured; already_running when it is deployed. [setup]
@@ -122,7 +122,7 @@ class Host : public Runner {
   void start_all(time_ns_t epoch_ns);
   /// Gives a parked task what it runs on, and takes it away; false when its thread would not end in time. [non-rt]
   virtual void begin_task(Task& task) = 0;
-  virtual bool end_task(Task& task) noexcept = 0;
+  virtual bool end_task(Task& task, time_ns_t until_ns) noexcept = 0;
   /// Notes who runs on it from now on. [non-rt]
   void note_hosted(const std::shared_ptr<Component>& component);
   /// All that run on it: components of the architecture, and those that leave it or have yet to enter it. [non-rt]

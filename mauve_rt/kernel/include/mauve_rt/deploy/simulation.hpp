@@ -71,7 +71,7 @@ class SimulatedHost final : public Host {
 
  protected:
   void begin_task(Task& task) override;
-  bool end_task(Task& task) noexcept override;
+  bool end_task(Task& task, time_ns_t until_ns) noexcept override;
 
  private:
   friend class Simulation;
