@@ -12,6 +12,7 @@
 
 #include "forked_run.hpp"
 #include "random_architecture.hpp"
+#include "random_ends.hpp"
 
 namespace mauve::testing::test_seeds {
 
@@ -99,6 +100,8 @@ TEST(SeededScheduler, FindsADeadlockAndFindsItAgain) {
 
 TEST(SeedsOfADeployment, GiveTheSameRunTwice) { run_twice(deploy_two); }
 TEST(SeedsOfADeployment, EndEachRun) { run_seeds(deploy_two, 200); }
+
+TEST(SeedsOfRandomEnds, AreMissedByNoThread) { run_seeds(random_ends, 300); }
 
 TEST(SeedsOfARandomArchitecture, GiveTheSameRunTwice) { run_twice(random_architecture); }
 TEST(SeedsOfARandomArchitecture, KeepTheRules) { run_seeds(random_architecture, 300); }

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A scenario of the seeds: what has just begun ends at any moment, and no thread misses its end.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <utility>
+
+#include "mauve_rt/base/seam/sleep.hpp"
+#include "mauve_rt/rules/rule_runner.hpp"
+
+#include "scenario/dice.hpp"
+#include "scenario/seed_parts.hpp"
+
+namespace mauve::testing {
+
+/// A deployment with a watchdog, a shadow and rules; each lives for some microseconds.
+inline void random_ends(std::uint64_t seed, seeds::Findings& findings) {
+  Dice dice(seed);
+  const auto live = [&dice] { sleep_for(dice.between(0, us_to_ns(dice.once_in(2) ? 30 : 400))); };
+  const auto shared = std::make_shared<Shared>(findings);
+  {
+    Architecture architecture;
+    architecture.add_component("c", new_part<Shell, TestShell>(),
+                               std::make_unique<SeedCore>(shared, 0, 0, Manner{}, seed),
+                               new_part<FsmBase, BoundedFsm>(), {.priority = 20});
+    architecture.configure();
+    Deployer deployer(architecture);
+    deployer.deploy();
+    for (int times = dice.below(3); times > 0; --times) {
+      rules::RuleRunner runner(deployer, std::make_unique<rules::Engine>(std::vector<rules::Rule>{}), {});
+      runner.start();
+      live();
+      runner.stop();
+      findings.count("runners ended");
+    }
+    if (dice.once_in(2)) {
+      Transaction change;
+      change.shadow("c", std::make_unique<SeedCore>(shared, 0, 1, Manner{}, seed), {.budget_ns = ms_to_ns(1)},
+                    std::make_unique<TestShell>());
+      deployer.commit(std::move(change), {.timeouts = {.phase_ns = 0}});
+    }
+    live();
+    deployer.shutdown();
+    findings.count("deployments ended");
+  }
+  for (int tries = 0; tries < 100 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
+  findings.expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+  for (const auto& [number, core] : shared->cores) findings.expect(false, "is left: " + core);
+}
+
+}  // namespace mauve::testing
