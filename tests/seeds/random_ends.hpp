@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/rules/rule_runner.hpp"
 
@@ -14,9 +15,36 @@
 
 namespace mauve::testing {
 
+/// Another thread does it again and again while `rest` runs.
+template <typename Act, typename Rest>
+void beside(Act&& act, Rest&& rest) {
+  OrdinaryThread other([&act] {
+    for (int times = 0; times < 20; ++times) {
+      act();
+      seeds::compute(us_to_ns(1));
+    }
+  });
+  rest();
+  other.join();
+}
+
+/// Ends a watchdog while a component wakes it.
+inline void end_watchdogs(Dice& dice, seeds::Findings& findings) {
+  for (int times = 0; times < 10; ++times) {
+    Watchdog watchdog;
+    beside([&] { watchdog.expect_end(0); },
+           [&] {
+             seeds::compute(dice.between(0, us_to_ns(40)));
+             watchdog.stop();
+           });
+    findings.count("watchdogs ended");
+  }
+}
+
 /// A deployment with a watchdog, a shadow and rules; each lives for some microseconds.
 inline void random_ends(std::uint64_t seed, seeds::Findings& findings) {
   Dice dice(seed);
+  if (dice.once_in(2)) return end_watchdogs(dice, findings);
   const auto live = [&dice] { sleep_for(dice.between(0, us_to_ns(dice.once_in(2) ? 30 : 400))); };
   const auto shared = std::make_shared<Shared>(findings);
   {
@@ -30,8 +58,11 @@ inline void random_ends(std::uint64_t seed, seeds::Findings& findings) {
     for (int times = dice.below(3); times > 0; --times) {
       rules::RuleRunner runner(deployer, std::make_unique<rules::Engine>(std::vector<rules::Rule>{}), {});
       runner.start();
-      live();
-      runner.stop();
+      beside([&] { architecture.changes().bump(); },
+             [&] {
+               live();
+               runner.stop();
+             });
       findings.count("runners ended");
     }
     if (dice.once_in(2)) {

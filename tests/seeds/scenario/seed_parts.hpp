@@ -155,9 +155,7 @@ class SeedCore : public Core<TestShell> {
   }
   void expect(bool is_true, const std::string& what) const { expect(is_true, what.c_str()); }
 
-  void compute(time_ns_t most_ns) noexcept {
-    seeds::compute(dice_.between(0, most_ns));
-  }
+  void compute(time_ns_t most_ns) noexcept { seeds::compute(dice_.between(0, most_ns)); }
   /// False: it refuses. Does nothing in other hooks than its own.
   bool behave(Hook hook) {
     if (hook != manner_.hook || manner_.is_good()) return true;
