@@ -5,6 +5,7 @@
 #include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/mman.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -59,8 +60,40 @@ struct Run {
   int status{0};  // of the child, as waitpid() has it
   Outcome outcome{};
   std::map<std::string, int> counts{};
-  std::string text{};  // findings
+  std::string text{};    // findings
+  std::string errors{};  // standard error of the child
   bool is_good() const noexcept { return status == 0 && text.empty(); }
+};
+
+/// A contract that breaks in a component's own code makes the component FAULTED, as any exception there: the run itself goes on.
+inline constexpr const char* kBrokenContract = ": broken ";
+
+inline std::string line_with(const std::string& text, std::size_t at) {
+  const std::size_t begin = text.rfind('\n', at) + 1;
+  return text.substr(begin, text.find('\n', at) - begin);
+}
+
+/// The standard error of a child: kept in memory, and copied to the standard error of this process.
+class ChildErrors {
+ public:
+  ChildErrors() : file_(memfd_create("errors", MFD_CLOEXEC)) {}
+  ~ChildErrors() { close(file_); }
+  ChildErrors(const ChildErrors&) = delete;
+  ChildErrors& operator=(const ChildErrors&) = delete;
+
+  void receive() const { dup2(file_, STDERR_FILENO); }
+  std::string take() const {
+    std::string text;
+    char part[4096];
+    lseek(file_, 0, SEEK_SET);
+    for (ssize_t length = 0; (length = read(file_, part, sizeof(part))) > 0;)
+      text.append(part, static_cast<std::size_t>(length));
+    [[maybe_unused]] const ssize_t copied = write(STDERR_FILENO, text.data(), text.size());
+    return text;
+  }
+
+ private:
+  int file_;
 };
 
 /// `trace`: the file to write the calls to; empty: none.
@@ -69,11 +102,13 @@ Run run_forked(const Scenario& scenario, std::uint64_t seed, const std::string& 
   constexpr unsigned kLongestSeconds = 120;  // of the real clock: the child spins without a call of the seam
   static const bool is_prepared = (prepare_forks(), true);
   static_cast<void>(is_prepared);
+  const ChildErrors errors;
   int ends[2];
   if (pipe(ends) != 0) return {.status = -1, .text = "no pipe"};
   const pid_t child = fork();
   if (child == 0) {
     close(ends[0]);
+    errors.receive();
     alarm(kLongestSeconds);
     mallopt(M_ARENA_MAX, 1);
     cpu_set_t here;  // the baton is passed fastest on one processor
@@ -117,6 +152,9 @@ Run run_forked(const Scenario& scenario, std::uint64_t seed, const std::string& 
   }
   close(ends[0]);
   waitpid(child, &run.status, 0);
+  run.errors = errors.take();
+  if (const std::size_t broken = run.errors.find(kBrokenContract); broken != std::string::npos)
+    run.text += "  at the contract: " + line_with(run.errors, broken) + "\n";
   return run;
 }
 

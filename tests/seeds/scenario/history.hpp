@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -24,6 +25,13 @@ struct Made {
   time_ns_t instant_ns{kNotMeasured};  // T
   time_ns_t began_ns{0}, ended_ns{0};  // of the request
   bool may_go_back{false};             // on probation
+};
+
+/// A component took part in a change that was made.
+struct Participation {
+  int component;
+  time_ns_t instant_ns;  // T of the change
+  time_ns_t began_ns, ended_ns;
 };
 
 /// A new epoch: all grids count from it.
@@ -47,6 +55,11 @@ class History {
 
   void note(const Made& made) { made_.push_back(made); }
   void note(const Epoch& epoch) { epochs_.push_back(epoch); }
+  void note(const Participation& participation) {
+    if (participation.instant_ns != kNotMeasured && participation.instant_ns != 0)
+      participations_.push_back(participation);
+  }
+  void note_sporadic(int component) { sporadic_.insert(component); }
   void note_verdict(int core, ProbationVerdict verdict) {
     verdicts_.try_emplace(core, Verdict{.verdict = verdict, .seen_ns = seeds::now_ns()});
   }
@@ -54,16 +67,21 @@ class History {
   /// Before T the old parts, from T on the new ones; each release on the grid and none twice; no state is lost or taken twice.
   void check(const Shared& shared) {
     took_from_ = shared.took_from;
+    hung_ = shared.hung_components;
     for (const Execution& execution : shared.executions) {
       check_state(execution);
       if (execution.is_in_shadow) continue;
+      check_instants(execution);
+      if (sporadic_.contains(execution.component)) check_event(execution, shared);
       check_order(execution);
       check_aspect(execution, Aspect::core, execution.core);
       check_aspect(execution, Aspect::gain, execution.gain);
       if (execution.input != kUnconnected && execution.input != 0.0)  // 0: what a stopped component writes
         check_aspect(execution, Aspect::input, execution.input);
       check_grid(execution);
+      last_[execution.component] = &execution;
     }
+    check_participations();
   }
 
  private:
@@ -85,6 +103,50 @@ class History {
     if (const auto last = last_counts_.find(core); last != last_counts_.end()) return last->second;
     const auto before = took_from_.find(core);
     return before != took_from_.end() ? count_of(before->second) : 0;
+  }
+
+  /// T of a change comes after each clock at which a participant has executed before.
+  void check_instants(const Execution& execution) {
+    for (const Participation& change : participations_) {
+      findings_.expect(
+          change.component != execution.component || execution.at_ns >= change.began_ns ||
+              execution.clock_ns < change.instant_ns,
+          where(execution) + " was before a change with the earlier T " + std::to_string(change.instant_ns));
+    }
+  }
+  /// T of a change comes after T of each earlier change of the same component.
+  void check_participations() {
+    for (const Participation& later : participations_) {
+      for (const Participation& earlier : participations_) {
+        if (earlier.component != later.component || earlier.ended_ns >= later.began_ns) continue;
+        findings_.expect(earlier.instant_ns < later.instant_ns,
+                         "component " + std::to_string(later.component) + " has a change with T " +
+                             std::to_string(later.instant_ns) + " after one with the later T " +
+                             std::to_string(earlier.instant_ns));
+      }
+    }
+  }
+
+  /// Releases of a sporadic component: each has its distance from the last one, and none comes at its timeout although there was an
+  /// event.
+  void check_event(const Execution& execution, const Shared& shared) {
+    const auto place = last_.find(execution.component);
+    if (place == last_.end() || place->second->interventions != execution.interventions) return;
+    const Execution& last = *place->second;
+    const time_ns_t waited_ns = execution.clock_ns - last.clock_ns;
+    if (last.core != execution.core) return;  // a fallback starts anew
+    findings_.expect(waited_ns >= EventFsm::kApart,
+                     where(execution) + " comes " + std::to_string(waited_ns) + " ns after the last release");
+    findings_.count("event waits");
+    if (waited_ns < EventFsm::kTimeout || last.input != execution.input) return;
+    findings_.count("event waits that timed out");
+    const auto writes = shared.writes.find(static_cast<int>(execution.input - written_by(0)));
+    if (execution.input < written_by(0) || writes == shared.writes.end()) return;
+    for (const time_ns_t at_ns : writes->second) {
+      findings_.expect(at_ns <= last.at_ns + kUnclear || at_ns >= execution.clock_ns - kUnclear,
+                       where(execution) + " was released by its timeout; the event at " +
+                           std::to_string(at_ns) + " was lost");
+    }
   }
 
   void check_order(const Execution& execution) {
@@ -145,7 +207,8 @@ class History {
     std::vector<time_ns_t> epochs;
     for (const Epoch& epoch : epochs_) {
       if (!may_be_after(execution, epoch)) continue;
-      if (!may_be_before(execution, epoch)) epochs.clear();
+      // One that hangs has no part in a new epoch, and keeps its grid.
+      if (!may_be_before(execution, epoch) && !hung_.contains(execution.component)) epochs.clear();
       epochs.push_back(epoch.epoch_ns);
     }
     for (const double period : possible(execution, Aspect::period)) {
@@ -157,7 +220,13 @@ class History {
     findings_.expect(false, where(execution) + " is not on its grid");
   }
 
+  static constexpr time_ns_t kUnclear = ms_to_ns(3);  // an event may be before the wait, or after it
+
   seeds::Findings& findings_;
+  std::vector<Participation> participations_;
+  std::set<int> sporadic_;
+  std::set<int> hung_;                    // components
+  std::map<int, const Execution*> last_;  // by component
   std::vector<Made> made_;
   std::vector<Epoch> epochs_;
   std::map<int, Verdict> verdicts_;

@@ -37,6 +37,14 @@ struct Execution {
   double input;        // what the component reads
   std::int64_t count;  // executions that the core's state knows of
   bool is_in_shadow;
+  int interventions;  // requests before it
+};
+
+/// A core that does not return from a hook or a state.
+struct Hang {
+  time_ns_t clock_ns;  // of the release
+  time_ns_t from_ns;
+  time_ns_t until_ns{kForever};
 };
 
 /// What all parts of a run share. One thread runs at a time: nothing needs a lock.
@@ -44,13 +52,22 @@ struct Shared {
   explicit Shared(seeds::Findings& all) : findings(all) {}
   seeds::Findings& findings;
   std::vector<Execution> executions{};
-  bool hung_may_go_on{false};
-  bool is_shut_down{false};               // or about to be
-  std::map<int, std::string> cores{};     // alive
-  std::map<int, int> took_from{};         // whose state each core took over
-  std::map<int, time_ns_t> hung_cores{};  // in the release of which instant
-  std::set<int> hung_components{};
-  std::set<int> misbehaved{};  // components
+  std::map<int, std::vector<time_ns_t>> writes{};  // by component: when a write to its output had ended
+  bool may_hang{true};
+  bool hung_may_go_on{false};  // all, from now on
+  int let_go{0};               // how often those that hung were let go on
+  time_ns_t slow_ns{0};        // what slow hooks and held locks took
+  bool is_shut_down{false};    // or about to be
+  bool has_shut_down{false};
+  int interventions{0};     // requests that start, stop or change components
+  std::set<int> stopped{};  // components that a stop has ended, and that no request has started since
+  std::map<int, std::string> cores{};  // alive
+  std::map<int, int> took_from{};      // whose state each core took over
+  std::map<int, Hang> hung_cores{};    // also those that have returned
+  std::set<int> hanging_components{};
+  std::set<int> hung_components{};  // also those whose cores have returned
+  std::set<int> bad_guards{};       // components whose guard misbehaved
+  std::multiset<int> configured{};  // components whose hooks a client calls
 };
 
 /// Where a core behaves badly.
@@ -92,8 +109,12 @@ class SeedCore : public Core<TestShell> {
   // ---- the methods of the fsm
 
   void act() {
+    const bool is_in_shadow = std::strcmp(seeds::running(), "shadow") == 0;
     expect(is_ready_, "executes and is not configured");
+    expect(!has_refused_, "executes although its adopt has refused");
     expect(!is_out_ || was_on_call_, "executes after another core took over from it");
+    expect(is_in_shadow || !shared_->has_shut_down, "executes after the shutdown");
+    expect(is_in_shadow || !shared_->stopped.contains(component_), "executes after a stop");
     is_out_ = false;
     shared_->executions.push_back({.component = component_,
                                    .clock_ns = clock_ns(),
@@ -102,11 +123,13 @@ class SeedCore : public Core<TestShell> {
                                    .gain = shell().gain.value(),
                                    .input = shell().input.read().value.value,
                                    .count = ++count_,
-                                   .is_in_shadow = std::strcmp(seeds::running(), "shadow") == 0});
+                                   .is_in_shadow = is_in_shadow,
+                                   .interventions = shared_->interventions});
     ++copied_;
     expect(copied_ == count_, "has other state fields than take() moved over: " + std::to_string(copied_) +
                                   " and " + std::to_string(count_));
     shell().output.write(Number{written_by(component_)});
+    if (!is_in_shadow) shared_->writes[component_].push_back(seeds::now_ns());
     if (count_ > 3 && dice_.once_in(4)) behave(Hook::state);
     compute(us_to_ns(60));
   }
@@ -131,7 +154,8 @@ class SeedCore : public Core<TestShell> {
   bool adopt(const CoreBase& /*old*/) override {
     expect(is_ready_, "adopts and is not configured");
     compute(us_to_ns(20));
-    return behave(Hook::adopt);
+    has_refused_ = !behave(Hook::adopt);
+    return !has_refused_;
   }
   void take(CoreBase& old) noexcept override {
     auto& before = static_cast<SeedCore&>(old);
@@ -159,9 +183,10 @@ class SeedCore : public Core<TestShell> {
   /// False: it refuses. Does nothing in other hooks than its own.
   bool behave(Hook hook) {
     if (hook != manner_.hook || manner_.is_good()) return true;
-    shared_->misbehaved.insert(component_);
+    if (hook == Hook::guard) shared_->bad_guards.insert(component_);
     const bool is_noexcept = hook == Hook::take;
-    const bool is_of_caller = shared_->is_shut_down && hook != Hook::state && hook != Hook::guard;
+    const bool is_of_caller = (shared_->is_shut_down || shared_->configured.contains(component_)) &&
+                              hook != Hook::state && hook != Hook::guard;
     switch (manner_.deed) {
       case Deed::nothing:
         return true;
@@ -170,8 +195,7 @@ class SeedCore : public Core<TestShell> {
         shared_->findings.count(manner_.name());
         throw std::runtime_error("as the seed wants");
       case Deed::hangs:
-        if (!is_of_caller)
-          hang();  // nothing runs any more: the hook is called by the thread that made the request
+        if (!is_of_caller) hang();  // else the hook is called by the thread that made the request
         return true;
       case Deed::refuses:
         return false;
@@ -180,16 +204,26 @@ class SeedCore : public Core<TestShell> {
         if (hook == Hook::state || hook == Hook::guard) {
           compute(us_to_ns(900));
         } else {
-          sleep_for(dice_.between(us_to_ns(100), ms_to_ns(8)));
+          const time_ns_t length_ns = dice_.between(us_to_ns(100), ms_to_ns(8));
+          shared_->slow_ns += length_ns;
+          sleep_for(length_ns);
         }
     }
     return true;
   }
+  /// Once.
   void hang() noexcept {
+    if (!shared_->may_hang || shared_->hung_cores.contains(number_)) return;
     shared_->findings.count(manner_.name());
-    shared_->hung_cores.emplace(number_, clock_ns());
+    Hang& here =
+        shared_->hung_cores.emplace(number_, Hang{.clock_ns = clock_ns(), .from_ns = seeds::now_ns()})
+            .first->second;
+    shared_->hanging_components.insert(component_);
     shared_->hung_components.insert(component_);
-    while (!shared_->hung_may_go_on) sleep_for(ms_to_ns(1));
+    const int let_go = shared_->let_go;
+    while (!shared_->hung_may_go_on && shared_->let_go == let_go) sleep_for(ms_to_ns(1));
+    here.until_ns = seeds::now_ns();
+    shared_->hanging_components.erase(component_);
   }
 
   std::shared_ptr<Shared> shared_;
@@ -200,6 +234,7 @@ class SeedCore : public Core<TestShell> {
   std::int64_t count_{0};   // take() moves it over
   std::int64_t copied_{0};  // the kernel copies it
   bool is_ready_{false};
+  bool has_refused_{false};
   bool is_on_probation_{false};
   bool is_out_{false};       // another core has taken over
   bool was_on_call_{false};  // on probation: it may come back
