@@ -378,7 +378,8 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
   if (task.is_abandoned()) component->stop_listening();
   component->conclude_shadow();
   const time_ns_t now_ns = monotonic_now_ns();
-  const bool ended = host_ != nullptr ? host_->detach(*component, now_ns + Runner::kThreadEnd) : task.end_thread(now_ns);
+  const bool ended =
+      host_ != nullptr ? host_->detach(*component, now_ns + Runner::kThreadEnd) : task.end_thread(now_ns);
   if (task.is_parked()) {
     const auto disconnect = [component] {
       for (const auto& port : component->shell().ports()) port->disconnect();

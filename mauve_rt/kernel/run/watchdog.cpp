@@ -86,7 +86,8 @@ void* Watchdog::write_entry(void* self) noexcept {
 void Watchdog::run() noexcept {
   for (;;) {
     const std::uint32_t alarm = alarm_.load(std::memory_order_acquire);
-    if (ending_.load(std::memory_order_acquire) != 0) return;  // after the alarm: stop() sets both, this one first
+    if (ending_.load(std::memory_order_acquire) != 0)
+      return;  // after the alarm: stop() sets both, this one first
     const time_ns_t looked_ns = monotonic_now_ns();
     const time_ns_t next_ns = look(looked_ns);
     if (!futex_wait_until(alarm_, alarm, next_ns)) continue;
