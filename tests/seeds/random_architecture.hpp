@@ -153,27 +153,31 @@ class RandomArchitecture : private Changes {
     constexpr std::array kPatience{time_ns_t{0}, ms_to_ns(20), ms_to_ns(60), s_to_ns(2)};
     const StopOptions options{.timeout_ns = dice.one_of(kPatience), .force = dice.once_in(2)};
     const std::string& name = parts_[index].name;
+    const bool cleans_up = dice.once_in(2);
     const Intervention here(*this);
     // One that another client starts again before this one looks waits for its timeout.
     const bool is_stopped =
         Scene::command((options.force ? "forced stop " : "stop ") + name, options.timeout_ns + kSlack,
-                       [&] { deployer_->stop(name, options); }, &here);
+                       [&] {
+                         deployer_->stop(name, options);
+                         if (cleans_up && here.is_sole() && state_of(index) == ComponentState::stopped)
+                           configure_anew(index, true);
+                       },
+                       &here);
     expect_just_faults();
     const ComponentState state = state_of(index);
     const double output = output_value(index);
     if (!is_stopped || state != ComponentState::stopped || !here.is_sole()) return;
     expect_zero(index, output, "after a stop");
     shared_->stopped.insert(static_cast<int>(index));
-    if (dice.once_in(3)) configure_anew(index);
   }
 
   /// Of a component that is stopped or FAULTED.
-  void configure_anew(std::size_t index) {
+  void configure_anew(std::size_t index, bool is_alone) {
     const std::string& name = parts_[index].name;
     const auto component = architecture_->find_component(name);
     if (component == nullptr) return;
     const ComponentState state = state_of(index);
-    const bool was_stopped = shared_->stopped.contains(static_cast<int>(index));
     const auto configured = shared_->configured.insert(static_cast<int>(index));
     Scene::command("cleanup and configure " + name, s_to_ns(2) + kSlack, [&] {
       try {
@@ -181,7 +185,7 @@ class RandomArchitecture : private Changes {
         component->configure();
         findings_.count(std::string("configured anew when ") + std::string(to_string(state)));
       } catch (const Error& error) {
-        expect(!was_stopped || error.code() != ErrorCode::already_running,
+        expect(!is_alone || state != ComponentState::stopped || error.code() != ErrorCode::already_running,
                name + " was stopped, and is refused: " + error.what());
         throw;
       }
@@ -189,12 +193,13 @@ class RandomArchitecture : private Changes {
     shared_->configured.erase(configured);
   }
 
-  /// Configures a FAULTED component anew, and starts it.
+  /// Configures a component that does not run anew, and starts it.
   void repair(std::size_t index) {
-    if (state_of(index) != ComponentState::faulted) return;
+    const ComponentState state = state_of(index);
+    if (state != ComponentState::faulted && state != ComponentState::stopped) return;
     {
       const Intervention here(*this);
-      configure_anew(index);
+      configure_anew(index, false);
     }
     start(index);
   }
@@ -205,6 +210,9 @@ class RandomArchitecture : private Changes {
     const time_ns_t length_ns = dice.between(0, ms_to_ns(4));
     const BiasedMutex::Hold hold(output->write.mutex(), nullptr);
     shared_->slow_ns += length_ns;
+    if (dice.once_in(2))
+      intervene("forced stop of the locked " + parts_[index].name, kSlack,
+                [&] { deployer_->stop(parts_[index].name, StopOptions{.timeout_ns = 0, .force = true}); });
     seeds::compute(length_ns);
   }
 };
