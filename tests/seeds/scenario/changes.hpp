@@ -58,8 +58,9 @@ class Changes : protected Checks {
       deployer_->stop(name, ms_to_ns(200));
       findings_.count("stops of pending starts");
     } catch (const Error& error) {
-      expect(error.code() != ErrorCode::not_running || !here.is_sole() ||
-                 state_of(index) != ComponentState::running,
+      sleep_for(ms_to_ns(2));
+      const ComponentState state = state_of(index);
+      expect(error.code() != ErrorCode::not_running || state != ComponentState::running || !here.is_sole(),
              "the stop of " + name + ", which a change has started, was refused: " + error.what());
     }
   }
