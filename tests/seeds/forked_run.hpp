@@ -111,7 +111,8 @@ Run run_forked(const Scenario& scenario, std::uint64_t seed, const std::string& 
     errors.receive();
     alarm(kLongestSeconds);
     mallopt(M_ARENA_MAX, 1);
-    cpu_set_t here;  // the baton is passed fastest on one processor
+    mallopt(M_PERTURB, 0xA5);  // the use of freed memory is seen
+    cpu_set_t here;            // the baton is passed fastest on one processor
     CPU_ZERO(&here);
     CPU_SET(static_cast<std::size_t>(sched_getcpu()), &here);
     sched_setaffinity(0, sizeof(here), &here);

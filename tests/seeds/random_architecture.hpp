@@ -54,7 +54,10 @@ class RandomArchitecture : private Changes {
         change(dice_, two_change_ ? Owner::first : Owner::only);
       }
     }
-    if (dice_.once_in(2)) {
+    if (dice_.once_in(12)) {
+      other.join();
+      shut_down_during_change();
+    } else if (dice_.once_in(2)) {
       shut_down("shutdown");
       other.join();
     } else {
@@ -115,7 +118,8 @@ class RandomArchitecture : private Changes {
         ++shared_->let_go;
         return;
       case 11:
-        return hold_output(dice, index);
+        hold_output(dice, index);
+        return expect_safe_faulted();
       case 12:
         return expect_safe_faulted();
       default:
@@ -153,27 +157,32 @@ class RandomArchitecture : private Changes {
     constexpr std::array kPatience{time_ns_t{0}, ms_to_ns(20), ms_to_ns(60), s_to_ns(2)};
     const StopOptions options{.timeout_ns = dice.one_of(kPatience), .force = dice.once_in(2)};
     const std::string& name = parts_[index].name;
+    const bool cleans_up = dice.once_in(2);
     const Intervention here(*this);
     // One that another client starts again before this one looks waits for its timeout.
     const bool is_stopped =
         Scene::command((options.force ? "forced stop " : "stop ") + name, options.timeout_ns + kSlack,
-                       [&] { deployer_->stop(name, options); }, &here);
+                       [&] {
+                         deployer_->stop(name, options);
+                         if (cleans_up && here.is_sole() && state_of(index) == ComponentState::stopped)
+                           configure_anew(index, true);
+                       },
+                       &here);
     expect_just_faults();
     const ComponentState state = state_of(index);
+    if (!is_stopped && state == ComponentState::faulted && dice.once_in(2)) return repair(index);
     const double output = output_value(index);
     if (!is_stopped || state != ComponentState::stopped || !here.is_sole()) return;
     expect_zero(index, output, "after a stop");
     shared_->stopped.insert(static_cast<int>(index));
-    if (dice.once_in(3)) configure_anew(index);
   }
 
   /// Of a component that is stopped or FAULTED.
-  void configure_anew(std::size_t index) {
+  void configure_anew(std::size_t index, bool is_alone) {
     const std::string& name = parts_[index].name;
     const auto component = architecture_->find_component(name);
     if (component == nullptr) return;
     const ComponentState state = state_of(index);
-    const bool was_stopped = shared_->stopped.contains(static_cast<int>(index));
     const auto configured = shared_->configured.insert(static_cast<int>(index));
     Scene::command("cleanup and configure " + name, s_to_ns(2) + kSlack, [&] {
       try {
@@ -181,7 +190,7 @@ class RandomArchitecture : private Changes {
         component->configure();
         findings_.count(std::string("configured anew when ") + std::string(to_string(state)));
       } catch (const Error& error) {
-        expect(!was_stopped || error.code() != ErrorCode::already_running,
+        expect(!is_alone || state != ComponentState::stopped || error.code() != ErrorCode::already_running,
                name + " was stopped, and is refused: " + error.what());
         throw;
       }
@@ -189,12 +198,13 @@ class RandomArchitecture : private Changes {
     shared_->configured.erase(configured);
   }
 
-  /// Configures a FAULTED component anew, and starts it.
+  /// Configures a component that does not run anew, and starts it.
   void repair(std::size_t index) {
-    if (state_of(index) != ComponentState::faulted) return;
+    const ComponentState state = state_of(index);
+    if (state != ComponentState::faulted && state != ComponentState::stopped) return;
     {
       const Intervention here(*this);
-      configure_anew(index);
+      configure_anew(index, false);
     }
     start(index);
   }
@@ -204,8 +214,38 @@ class RandomArchitecture : private Changes {
     auto* const output = dynamic_cast<LatestValue<Number>*>(&architecture_->resource(output_of(index)));
     const time_ns_t length_ns = dice.between(0, ms_to_ns(4));
     const BiasedMutex::Hold hold(output->write.mutex(), nullptr);
-    shared_->slow_ns += length_ns;
+    shared_->slow_ns += 2 * length_ns;
     seeds::compute(length_ns);
+    if (dice.once_in(2))
+      intervene("forced stop of the locked " + parts_[index].name, kSlack,
+                [&] { deployer_->stop(parts_[index].name, StopOptions{.timeout_ns = 0, .force = true}); });
+    seeds::compute(length_ns);
+  }
+
+  /// A change that a shutdown overtakes ends with it, even where an adopt of a stopped component hangs.
+  void shut_down_during_change() {
+    const auto index = static_cast<std::size_t>(any(dice_));
+    const std::string& name = parts_[index].name;
+    Scene::command("stop " + name, kSlack, [&] { deployer_->stop(name, ms_to_ns(60)); });
+    OrdinaryThread overtaken([this, &name, index] {
+      Transaction transaction;
+      transaction.replace_core(name, core(next_core_++, static_cast<int>(index),
+                                          Manner{.hook = Hook::adopt, .deed = Deed::hangs}));
+      try {
+        deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = s_to_ns(3)}});
+      } catch (const Error& error) {
+        findings_.note(std::string("overtaken: ") + error.what());
+      }
+    });
+    sleep_for(dice_.between(0, ms_to_ns(2)));
+    const time_ns_t began_ns = seeds::now_ns();
+    const time_ns_t excused_ns = excuses_ns();
+    shut_down("shutdown during a change");
+    overtaken.join();
+    const time_ns_t took_ns = seeds::now_ns() - began_ns - (excuses_ns() - excused_ns);
+    findings_.count("changes overtaken by a shutdown");
+    expect(took_ns <= kShutdown + kPatience,
+           "a change that a shutdown has overtaken took " + std::to_string(took_ns / 1000) + " us more");
   }
 };
 

@@ -101,6 +101,8 @@ void Component::configure() {
 
 void Component::cleanup() {
   const auto change = join_change();
+  // First: a start would run the parts that are being cleaned up.
+  while (is_configured() && !task_.unconfigure()) require_parked("cleanup");
   Configurable::cleanup();
 }
 

@@ -80,6 +80,13 @@ void Task::set_machine(Shell& shell, const FsmBase& fsm, CoreBinding* core, time
 
 void Task::set_state(ComponentState state) noexcept { publish_state(state); }
 
+bool Task::unconfigure() noexcept {
+  const LockGuard lock(command_mutex_);  // a start is posted under it
+  if (!is_parked()) return false;
+  publish_state(ComponentState::unconfigured);
+  return true;
+}
+
 void Task::swap_fault(FaultNote& note) noexcept {
   const LockGuard lock(fault_mutex_);
   MAUVE_RT_TRUSTED(std::swap(fault_, note));  // moves: nothing is allocated, nothing freed

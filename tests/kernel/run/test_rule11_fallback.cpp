@@ -104,6 +104,36 @@ TEST_F(Rule11Fallback, CleanupAndConfigureGiveTheDeclaredCoreAnotherChance) {
   EXPECT_FALSE(component.task().has_fallen_back());
 }
 
+struct CoreWithCleanup : TestCore {
+  std::function<void()> at_cleanup = [] {};
+  void cleanup_hook() override { at_cleanup(); }
+};
+
+TEST_F(Rule11Fallback, NoStartComesIntoACleanup) {
+  Component& component = add("c", 10);
+  auto spare = std::make_unique<CoreWithCleanup>();
+  ErrorCode refused{};
+  spare->at_cleanup = [&] {
+    try {
+      host().start("c");
+    } catch (const Error& error) {
+      refused = error.code();
+    }
+  };
+  component.set_fallback(std::move(spare));
+  deploy();
+  run_to(ms_to_ns(25));
+  host().stop("c");
+  const int runs = core(component).runs;
+  component.cleanup();
+  EXPECT_EQ(ErrorCode::not_configured, refused);
+  EXPECT_EQ(ComponentState::unconfigured, component.task().state());
+  component.configure();
+  run_to(ms_to_ns(45));
+  EXPECT_EQ(runs, core(component).runs);
+  EXPECT_EQ(ComponentState::stopped, component.task().state());
+}
+
 TEST_F(Rule11Fallback, ACoreThatReplacesItIsGuardedByItAgain) {
   Component& component = add_guarded();
   deploy();

@@ -31,12 +31,13 @@ class Changes : protected Checks {
     const std::uint64_t revision = architecture_->revision();
     const int prepared = prepared_;
     const bool may_be_preempted = open_prepared_ > 0;
-    carry_out(dice, draft, may_prepare);
+    carry_out(dice, draft, may_prepare, here);
     const std::optional<TransactionReport>& report = draft.report;
     findings_.note(report ? "made, T " + std::to_string(report->instant_ns) : "refused: " + draft.refusal);
     const std::string outcome = draft.text + (report ? ": made" : ": refused: " + draft.refusal);
     findings_.count(report ? "changes made" : draft.options.dry_run ? "dry runs" : "changes refused");
-    if (report) note_made(draft);
+    if (report) note_made(draft, here);
+    expect_right_refusal(draft, outcome);
     expect(draft.refusal.find("a prepared change") == std::string::npos || prepared_ != prepared ||
                may_be_preempted,
            outcome + ", and there is no prepared change");
@@ -57,8 +58,9 @@ class Changes : protected Checks {
       deployer_->stop(name, ms_to_ns(200));
       findings_.count("stops of pending starts");
     } catch (const Error& error) {
-      expect(error.code() != ErrorCode::not_running || !here.is_sole() ||
-                 state_of(index) != ComponentState::running,
+      sleep_for(ms_to_ns(2));
+      const ComponentState state = state_of(index);
+      expect(error.code() != ErrorCode::not_running || state != ComponentState::running || !here.is_sole(),
              "the stop of " + name + ", which a change has started, was refused: " + error.what());
     }
   }
@@ -81,6 +83,8 @@ class Changes : protected Checks {
     std::string text{"change:"};
     std::vector<Part> before{}, after{};
     std::vector<bool> touched{};
+    std::vector<bool> runs{};       // before
+    std::vector<bool> only_sets{};  // properties or connections: that repairs nothing
     std::size_t started{kNobody};
     bool changes_extra{false};
     int extra_before{kNone}, extra_after{kNone}, extra_core{kNone};
@@ -110,13 +114,18 @@ class Changes : protected Checks {
   // ---- what is to be changed
 
   Draft drawn(Dice& dice, Owner owner) {
-    Draft draft{
-        .owner = owner, .before = parts_, .after = parts_, .touched = std::vector<bool>(parts_.size())};
+    Draft draft{.owner = owner,
+                .before = parts_,
+                .after = parts_,
+                .touched = std::vector<bool>(parts_.size()),
+                .runs = std::vector<bool>(parts_.size()),
+                .only_sets = std::vector<bool>(parts_.size(), true)};
     next_gain_ = next_gain_ > 9.0 ? 0.125 : next_gain_ + 0.125;
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       if (!owns(owner, i) || dice.once_in(2)) continue;
       const std::size_t steps = draft.transaction.steps().size();
       enter_component(draft, i, dice);
+      draft.runs[i] = state_of(i) == ComponentState::running;
       draft.touched[i] = draft.transaction.steps().size() != steps;
     }
     if (dice.once_in(3)) enter_extra(draft, dice);
@@ -130,21 +139,26 @@ class Changes : protected Checks {
                                   .phase_ns = dice.once_in(2) ? 0 : ms_to_ns(30),
                                   .prepare_ns = kPrepare},
                      .dry_run = dice.once_in(10),
-                     .force = dice.once_in(6)};
+                     .force = dice.once_in(shared_->hanging > 0 ? 2 : 6)};
     return draft;
   }
 
   void enter_component(Draft& draft, std::size_t index, Dice& dice) {
     Part& part = draft.after[index];
     part.trial = kNone;
-    if (dice.once_in(10)) return enter_shadow(draft, index, dice);
+    if (dice.once_in(10)) {
+      draft.only_sets[index] = false;
+      return enter_shadow(draft, index, dice);
+    }
     if (dice.once_in(2)) {
       draft.transaction.set_property(part.name, "gain", part.gain = next_gain_);
       draft.text += " gain " + part.name;
     }
     if (dice.once_in(6)) wire(draft, part, dice);
+    const std::size_t settings = draft.transaction.steps().size();
     enter_parts(draft, index, dice);
     enter_command(draft, index, dice);
+    draft.only_sets[index] = draft.transaction.steps().size() == settings;
   }
 
   /// Starts a component that stands, or stops one that runs; now and then the other way round, which is refused.
@@ -189,9 +203,10 @@ class Changes : protected Checks {
     }
     if (part.is_sporadic) return;
     const Manner manner = Manner::any(dice);
-    draft.text += " shadow " + std::to_string(next_core_) + " (" + manner.name() + ") " + part.name;
-    draft.transaction.shadow(part.name, core(static_cast<int>(index), manner), {.budget_ns = ms_to_ns(1)},
-                             std::make_unique<TestShell>());
+    const int number = next_core_++;
+    draft.text += " shadow " + std::to_string(number) + " (" + manner.name() + ") " + part.name;
+    draft.transaction.shadow(part.name, core(number, static_cast<int>(index), manner),
+                             {.budget_ns = ms_to_ns(1)}, std::make_unique<TestShell>());
   }
 
   /// New parts of one component: a core, on probation or not, an fsm with the same period or another one, a shell.
@@ -218,10 +233,10 @@ class Changes : protected Checks {
     Part& part = draft.after[index];
     const Manner manner = Manner::any(dice);
     const bool is_on_probation = !part.is_sporadic && dice.once_in(3);
-    part.core = next_core_;
+    part.core = next_core_++;
     draft.text += " core " + std::to_string(part.core) + " (" + manner.name() +
                   (is_on_probation ? ", on probation" : "") + ") " + part.name;
-    auto fresh = core(static_cast<int>(index), manner, is_on_probation);
+    auto fresh = core(part.core, static_cast<int>(index), manner, is_on_probation);
     if (!is_on_probation) {
       draft.transaction.replace_core(part.name, std::move(fresh));
       return false;
@@ -241,30 +256,47 @@ class Changes : protected Checks {
     draft.extra_before = extra.number;
     draft.text += (extra.number == kNone ? " add " : " remove ") + extra.name;
     if (extra.number != kNone) {
+      if (shared_->hanging_components.contains(extra.number) && dice.once_in(2)) enter_refusal(draft);
       draft.transaction.remove_component(extra.name);
       draft.transaction.remove_resource(extra.output());
       return;
     }
     ComponentParts rest{.settings = {.priority = 10 + 10 * dice.below(4)}};
     rest.properties["period_ms"] = std::int64_t{kExtraPeriod / ms_to_ns(1)};
-    draft.extra_core = next_core_;
+    draft.extra_core = next_core_++;
     draft.extra_after = next_extra_++;
-    const Manner manner = dice.once_in(3) ? Manner::any(dice) : Manner{};
+    const Manner hangs{.hook = Hook::state, .deed = Deed::hangs};
+    const Manner manner = dice.once_in(6) ? hangs : dice.once_in(3) ? Manner::any(dice) : Manner{};
     draft.text += " (" + manner.name() + ")";
     draft.transaction.add_resource(extra.output(), std::make_unique<LatestValue<Number>>());
     draft.transaction.add_component(extra.name,
                                     Parts{.shell = new_part<Shell, TestShell>(),
-                                          .core = core(draft.extra_after, manner),
+                                          .core = core(draft.extra_core, draft.extra_after, manner),
                                           .fsm = new_part<FsmBase, SeedFsm>()},
                                     rest);
     draft.transaction.connect(extra.name, "output", extra.output(), "write");
     draft.transaction.start(extra.name);
   }
 
+  /// A participant that refuses.
+  void enter_refusal(Draft& draft) {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      if (!owns(draft.owner, i) || draft.touched[i]) continue;
+      draft.touched[i] = true;
+      draft.only_sets[i] = false;
+      draft.after[i].core = next_core_++;
+      draft.transaction.replace_core(
+          parts_[i].name,
+          core(draft.after[i].core, static_cast<int>(i), Manner{.hook = Hook::adopt, .deed = Deed::refuses}));
+      draft.text += " refusing " + parts_[i].name;
+      return;
+    }
+  }
+
   // ---- how it is changed
 
   /// At once, in two halves, or prepared and committed by a real-time thread.
-  void carry_out(Dice& dice, Draft& draft, bool may_prepare) {
+  void carry_out(Dice& dice, Draft& draft, bool may_prepare, const Intervention& here) {
     const CommitTimeouts timeouts = draft.options.timeouts;
     time_ns_t longest_ns = 2 * timeouts.commit_ns + timeouts.phase_ns + kPrepare + kSlack;
     if (two_change_) longest_ns *= 2;  // it waits for the other one's
@@ -278,7 +310,7 @@ class Changes : protected Checks {
     timed(draft.text, longest_ns, kPrompt + timeouts.phase_ns, [&] {
       try {
         if (way == 3) {
-          draft.report = commit_prepared(dice, draft);
+          draft.report = commit_prepared(dice, draft, here);
         } else if (way == 2) {
           const auto made = deployer_->make(std::move(draft.transaction), draft.options);
           draft.report = made->report(timeouts.phase_ns);
@@ -293,7 +325,7 @@ class Changes : protected Checks {
     if (draft.options.dry_run) draft.report.reset();
   }
 
-  TransactionReport commit_prepared(Dice& dice, Draft& draft) {
+  TransactionReport commit_prepared(Dice& dice, Draft& draft, const Intervention& here) {
     const Preparation open(*this);
     const auto prepared = deployer_->prepare(std::move(draft.transaction), draft.options);
     const time_ns_t between_ns = seeds::now_ns();
@@ -303,7 +335,6 @@ class Changes : protected Checks {
       sleep_for(dice.between(0, ms_to_ns(3)));
     }
     shared_->slow_ns += seeds::now_ns() - between_ns;
-    const Intervention here(*this);
     commit_by_any_thread(dice, *prepared, draft.options.timeouts.commit_ns);
     if (draft.started != kNobody && dice.once_in(2)) stop_what_was_started(draft.started, here);
     findings_.count("prepared changes");
@@ -341,9 +372,11 @@ class Changes : protected Checks {
     return instant_ns;
   }
 
-  void note_made(const Draft& draft) {
+  void note_made(const Draft& draft, const Intervention& here) {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
-      if (draft.touched[i]) note_component(draft, i);
+      if (!draft.touched[i]) continue;
+      note_component(draft, i);
+      expect_fit(draft, i, here);
     }
     if (draft.resynchronises)
       history_.note(Epoch{.epoch_ns = deployer_->epoch_ns(),
@@ -351,6 +384,34 @@ class Changes : protected Checks {
                           .began_ns = draft.began_ns,
                           .ended_ns = seeds::now_ns()});
     if (draft.changes_extra) note_extra(draft);
+  }
+
+  /// Before the commit a fault calls the change off. One that was parked took no change in flight.
+  void expect_fit(const Draft& draft, std::size_t index, const Intervention& here) {
+    if (!draft.runs[index] || !draft.only_sets[index]) return;
+    const bool is_faulted = state_of(index) == ComponentState::faulted;
+    const bool was_in_flight = instant_of(*draft.report, parts_[index].name) != kNotMeasured;
+    expect(!is_faulted || was_in_flight || !here.is_sole(),
+           draft.text + ": made although " + parts_[index].name + " is FAULTED");
+  }
+
+  /// A refusal for want of time comes when the time is over; by force each state that hangs was given up then.
+  void expect_right_refusal(const Draft& draft, const std::string& outcome) {
+    if (draft.refusal.find("in time; nothing was changed") == std::string::npos) return;
+    const time_ns_t took_ns = seeds::now_ns() - draft.began_ns;
+    expect(took_ns >= draft.options.timeouts.commit_ns,
+           outcome + " after " + std::to_string(took_ns) + " ns");
+    if (!draft.options.force) return;
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      const auto hung = shared_->hung_cores.find(draft.before[i].core);
+      if (!draft.touched[i] || draft.before[i].core == draft.after[i].core ||
+          hung == shared_->hung_cores.end())
+        continue;
+      const bool has_hung = hung->second.is_in_state && hung->second.from_ns < draft.began_ns &&
+                            hung->second.until_ns == kForever;
+      expect(!has_hung || state_of(i) != ComponentState::running,
+             outcome + ": " + parts_[i].name + " hangs, and was not given up");
+    }
   }
 
   void note_component(const Draft& draft, std::size_t index) {

@@ -50,7 +50,7 @@ class Checks : protected Scene {
 
   // ---- states
 
-  /// A wait is never given up. A guard is of the wait's name.
+  /// A wait is never given up, and a fault names the state that it was in. A guard is of the wait's name.
   void expect_just_faults() {
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const auto component = architecture_->find_component(parts_[i].name);
@@ -58,6 +58,9 @@ class Checks : protected Scene {
       const Fault fault = component->task().fault();
       expect(fault.what.find("state Pause") == std::string::npos,
              component->name() + " was given up in its wait: " + fault.what);
+      expect(!fault.what.starts_with("stopped by force while state") ||
+                 fault.what.find("state " + fault.where + " ") != std::string::npos,
+             component->name() + " has a fault in " + fault.where + ": " + fault.what);
     }
   }
 

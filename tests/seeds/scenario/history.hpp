@@ -72,6 +72,7 @@ class History {
       check_state(execution);
       if (execution.is_in_shadow) continue;
       check_instants(execution);
+      check_visits(execution, shared);
       if (sporadic_.contains(execution.component)) check_event(execution, shared);
       check_order(execution);
       check_aspect(execution, Aspect::core, execution.core);
@@ -105,6 +106,26 @@ class History {
     return before != took_from_.end() ? count_of(before->second) : 0;
   }
 
+  /// An adopt that lasts a period beyond a release misses it: the next one is not in the past.
+  void check_visits(const Execution& execution, const Shared& shared) {
+    const auto place = last_.find(execution.component);
+    if (place == last_.end() || sporadic_.contains(execution.component)) return;
+    const Execution& last = *place->second;
+    for (const Visit& visit : shared.visits) {
+      if (visit.component != execution.component || visit.from_ns < last.at_ns ||
+          visit.to_ns > execution.at_ns)
+        continue;
+      const std::vector<double> periods = possible(last, Aspect::period);
+      if (periods.size() != 1) continue;
+      const auto period_ns = static_cast<time_ns_t>(periods.front());
+      const time_ns_t due_ns = last.clock_ns + period_ns;
+      if (visit.from_ns >= due_ns || visit.to_ns < due_ns + period_ns) continue;
+      findings_.count("visits that missed a release");
+      findings_.expect(execution.clock_ns >= visit.to_ns,
+                       where(execution) + " was due in an adopt or take, which lasted from " +
+                           std::to_string(visit.from_ns) + " to " + std::to_string(visit.to_ns));
+    }
+  }
   /// T of a change comes after each clock at which a participant has executed before.
   void check_instants(const Execution& execution) {
     for (const Participation& change : participations_) {

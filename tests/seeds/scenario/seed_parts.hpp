@@ -44,7 +44,14 @@ struct Execution {
 struct Hang {
   time_ns_t clock_ns;  // of the release
   time_ns_t from_ns;
+  bool is_in_state;
   time_ns_t until_ns{kForever};
+};
+
+/// An adopt or a take on the thread of a component.
+struct Visit {
+  int component;
+  time_ns_t from_ns, to_ns;
 };
 
 /// What all parts of a run share. One thread runs at a time: nothing needs a lock.
@@ -67,7 +74,14 @@ struct Shared {
   std::set<int> hanging_components{};
   std::set<int> hung_components{};  // also those whose cores have returned
   std::set<int> bad_guards{};       // components whose guard misbehaved
+  int hanging{0};                   // cores
+  time_ns_t returned_ns{0};         // when the last core returned
+  std::vector<Visit> visits{};
   std::multiset<int> configured{};  // components whose hooks a client calls
+};
+
+struct BoundedStates {
+  static constexpr time_ns_t kLongest = ms_to_ns(2);
 };
 
 /// Where a core behaves badly.
@@ -87,7 +101,7 @@ struct Manner {
   }
   static Manner any(Dice& dice) {
     if (dice.once_in(2)) return {};
-    return {.hook = static_cast<Hook>(dice.below(kHookNames.size())),
+    return {.hook = dice.once_in(4) ? Hook::state : static_cast<Hook>(dice.below(kHookNames.size())),
             .deed = static_cast<Deed>(1 + dice.below(kDeedNames.size() - 1))};
   }
 };
@@ -153,11 +167,13 @@ class SeedCore : public Core<TestShell> {
   }
   bool adopt(const CoreBase& /*old*/) override {
     expect(is_ready_, "adopts and is not configured");
+    const VisitNote note(*this);
     compute(us_to_ns(20));
     has_refused_ = !behave(Hook::adopt);
     return !has_refused_;
   }
   void take(CoreBase& old) noexcept override {
+    const VisitNote note(*this);
     auto& before = static_cast<SeedCore&>(old);
     expect(before.component_ == component_, "takes the state of a core of another component");
     expect(!shared_->took_from.contains(number_), "takes over twice");
@@ -172,6 +188,22 @@ class SeedCore : public Core<TestShell> {
   std::string description() const override { return "core " + std::to_string(number_); }
 
  private:
+  class VisitNote {
+   public:
+    explicit VisitNote(SeedCore& core) : core_(core), from_ns_(seeds::now_ns()) {}
+    ~VisitNote() {
+      if (std::strcmp(seeds::running(), "shadow") != 0)
+        core_.shared_->visits.push_back(
+            {.component = core_.component_, .from_ns = from_ns_, .to_ns = seeds::now_ns()});
+    }
+    VisitNote(const VisitNote&) = delete;
+    VisitNote& operator=(const VisitNote&) = delete;
+
+   private:
+    SeedCore& core_;
+    time_ns_t from_ns_;
+  };
+
   void expect(bool is_true, const char* what) const {
     if (!is_true)
       shared_->findings.expect(false,
@@ -202,7 +234,14 @@ class SeedCore : public Core<TestShell> {
       case Deed::slow:
         shared_->findings.count(manner_.name());
         if (hook == Hook::state || hook == Hook::guard) {
-          compute(us_to_ns(900));
+          if (dice_.once_in(2)) {
+            compute(us_to_ns(900));
+          } else {  // about as long as the bound of some states
+            const time_ns_t length_ns =
+                dice_.between(BoundedStates::kLongest - us_to_ns(60), BoundedStates::kLongest + us_to_ns(60));
+            shared_->slow_ns += length_ns;
+            seeds::compute(length_ns);
+          }
         } else {
           const time_ns_t length_ns = dice_.between(us_to_ns(100), ms_to_ns(8));
           shared_->slow_ns += length_ns;
@@ -215,14 +254,21 @@ class SeedCore : public Core<TestShell> {
   void hang() noexcept {
     if (!shared_->may_hang || shared_->hung_cores.contains(number_)) return;
     shared_->findings.count(manner_.name());
-    Hang& here =
-        shared_->hung_cores.emplace(number_, Hang{.clock_ns = clock_ns(), .from_ns = seeds::now_ns()})
-            .first->second;
+    Hang& here = shared_->hung_cores
+                     .emplace(number_, Hang{.clock_ns = clock_ns(),
+                                            .from_ns = seeds::now_ns(),
+                                            .is_in_state = manner_.hook == Hook::state})
+                     .first->second;
     shared_->hanging_components.insert(component_);
     shared_->hung_components.insert(component_);
     const int let_go = shared_->let_go;
-    while (!shared_->hung_may_go_on && shared_->let_go == let_go) sleep_for(ms_to_ns(1));
-    here.until_ns = seeds::now_ns();
+    const time_ns_t until_ns =
+        dice_.once_in(2) ? kForever : seeds::now_ns() + dice_.between(ms_to_ns(1), ms_to_ns(300));
+    ++shared_->hanging;
+    while (!shared_->hung_may_go_on && shared_->let_go == let_go && seeds::now_ns() < until_ns)
+      sleep_for(ms_to_ns(1));
+    --shared_->hanging;
+    shared_->returned_ns = here.until_ns = seeds::now_ns();
     shared_->hanging_components.erase(component_);
   }
 
@@ -259,7 +305,7 @@ struct SeedFsm : Fsm<TestShell, SeedCore> {
 /// The same with a bound, which a slow core exceeds.
 struct BoundedFsm : Fsm<TestShell, SeedCore> {
   void define() override {
-    State& run = execution("Run", "act", &SeedCore::act, ms_to_ns(2));
+    State& run = execution("Run", "act", &SeedCore::act, BoundedStates::kLongest);
     State& pause = wait("Pause", ms_to_ns(shell().period_ms.value()));
     set_initial(run);
     next(run, pause);

@@ -310,6 +310,8 @@ class Task final : public Waiter {
   }
   /// For configure and cleanup of the component. [non-rt]
   void set_state(ComponentState state) noexcept;
+  /// Makes a parked component UNCONFIGURED: no start comes any more. False: it is not parked, or a start is posted. [non-rt]
+  bool unconfigure() noexcept;
   /// Exchanges what is known of the last fault, for one to be forgotten or remembered. [rt], the machine parked.
   void swap_fault(FaultNote& note) MAUVE_RT;
   /// Forgets a fault, for configure. [non-rt], parked.
