@@ -11,7 +11,7 @@
 #include "mauve_rt/base/seam/sleep.hpp"
 
 #include "forked_run.hpp"
-#include "random_architecture.hpp"
+#include "scenarios.hpp"
 
 namespace mauve::testing::test_seeds {
 
@@ -100,7 +100,12 @@ TEST(SeededScheduler, FindsADeadlockAndFindsItAgain) {
 TEST(SeedsOfADeployment, GiveTheSameRunTwice) { run_twice(deploy_two); }
 TEST(SeedsOfADeployment, EndEachRun) { run_seeds(deploy_two, 200); }
 
-TEST(SeedsOfARandomArchitecture, GiveTheSameRunTwice) { run_twice(random_architecture); }
-TEST(SeedsOfARandomArchitecture, KeepTheRules) { run_seeds(random_architecture, 300); }
+class SeedsOf : public ::testing::TestWithParam<SeedScenario> {};
+
+TEST_P(SeedsOf, GiveTheSameRunTwice) { run_twice(GetParam().run); }
+TEST_P(SeedsOf, KeepTheRules) { run_seeds(GetParam().run, 300); }
+
+INSTANTIATE_TEST_SUITE_P(All, SeedsOf, ::testing::ValuesIn(kScenarios),
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace mauve::testing::test_seeds
