@@ -8,6 +8,7 @@
 #include "forked_run.hpp"
 #include "random_architecture.hpp"
 #include "random_data.hpp"
+#include "random_rules.hpp"
 
 namespace mauve::testing {
 
@@ -19,6 +20,7 @@ struct SeedScenario {
 inline constexpr std::array kScenarios = std::to_array<SeedScenario>({
     {"random_architecture", random_architecture},
     {"random_data", random_data},
+    {"random_rules", random_rules},
 });
 
 }  // namespace mauve::testing
