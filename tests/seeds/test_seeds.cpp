@@ -3,6 +3,7 @@
 // MAUVE_SEEDS asks for so many seeds, MAUVE_SEED for the first of them, MAUVE_SEED_TRACE for a file with the calls of that one.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -11,8 +12,7 @@
 #include "mauve_rt/base/seam/sleep.hpp"
 
 #include "forked_run.hpp"
-#include "random_architecture.hpp"
-#include "random_ends.hpp"
+#include "scenarios.hpp"
 
 namespace mauve::testing::test_seeds {
 
@@ -87,7 +87,7 @@ void run_twice(const Scenario& scenario, std::uint64_t seed) {
 template <typename Scenario>
 void run_twice(const Scenario& scenario) {
   const std::uint64_t first = asked("MAUVE_SEED", 1);
-  const std::uint64_t end = first + asked("MAUVE_SEEDS", 20);
+  const std::uint64_t end = first + std::min<std::uint64_t>(20, asked("MAUVE_SEEDS", 20));
   for (std::uint64_t seed = first; seed < end; ++seed) run_twice(scenario, seed);
 }
 
@@ -101,9 +101,12 @@ TEST(SeededScheduler, FindsADeadlockAndFindsItAgain) {
 TEST(SeedsOfADeployment, GiveTheSameRunTwice) { run_twice(deploy_two); }
 TEST(SeedsOfADeployment, EndEachRun) { run_seeds(deploy_two, 200); }
 
-TEST(SeedsOfRandomEnds, AreMissedByNoThread) { run_seeds(random_ends, 300); }
+class SeedsOf : public ::testing::TestWithParam<SeedScenario> {};
 
-TEST(SeedsOfARandomArchitecture, GiveTheSameRunTwice) { run_twice(random_architecture); }
-TEST(SeedsOfARandomArchitecture, KeepTheRules) { run_seeds(random_architecture, 300); }
+TEST_P(SeedsOf, GiveTheSameRunTwice) { run_twice(GetParam().run); }
+TEST_P(SeedsOf, KeepTheRules) { run_seeds(GetParam().run, 300); }
+
+INSTANTIATE_TEST_SUITE_P(All, SeedsOf, ::testing::ValuesIn(kScenarios),
+                         [](const auto& tested) { return std::string(tested.param.name); });
 
 }  // namespace mauve::testing::test_seeds

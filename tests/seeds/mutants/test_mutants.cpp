@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Whether the seeds find planted faults: runs the seeds with one mutant after the other, each up to the first bad run.
-// MAUVE_MUTANT asks for one number or for a range (17, 1-20), MAUVE_SEEDS for so many seeds, MAUVE_WRITE_FOUND for a new found.txt.
+// MAUVE_MUTANT asks for one number or for a range (17, 1-20), MAUVE_SEEDS for so many seeds, MAUVE_SCENARIO for
+// one scenario, MAUVE_WRITE_FOUND for a new found.txt.
 #include <fcntl.h>
 #include <sys/file.h>
 #include <sys/mman.h>
@@ -19,7 +20,7 @@
 #include <vector>
 
 #include "forked_run.hpp"
-#include "random_architecture.hpp"
+#include "scenarios.hpp"
 #include "seeds/planted.hpp"
 
 namespace mauve::testing::test_mutants {
@@ -105,17 +106,34 @@ struct Found {
   long reached{0};  // how often the runs came to the mutant
 };
 
-/// The first seed whose run is bad with this mutant.
+/// Runs one scenario; empty: nothing was wrong.
+std::string fault_of(const SeedScenario& scenario, std::uint64_t seed, StandardError& errors) {
+  const Run run = seeds::run_forked(scenario.run, seed);
+  const std::string text = errors.take();
+  const bool is_good = run.is_good() && text.find(kBrokenContract) == std::string::npos;
+  return is_good ? "" : std::string(scenario.name) + ": " + reason(run, text);
+}
+
+/// Of one scenario (MAUVE_SCENARIO), or of all.
+bool is_asked(const SeedScenario& scenario) {
+  const std::string asked = seeds::variable("MAUVE_SCENARIO");
+  return asked.empty() || asked == scenario.name;
+}
+
+/// The first seed of which the run of a scenario is bad with this mutant.
 Found find(int number, std::uint64_t seeds) {
   StandardError errors;
   seeds::planted_number = number;
   *seeds::reached = 0;
   Found found;
   for (std::uint64_t seed = 1; seed <= seeds && found.seed == 0; ++seed) {
-    const Run run = seeds::run_forked(random_architecture, seed);
-    const std::string text = errors.take();
-    const bool is_good = run.is_good() && text.find(kBrokenContract) == std::string::npos;
-    if (!is_good) found = {.seed = seed, .reason = reason(run, text)};
+    for (const SeedScenario& scenario : kScenarios) {
+      if (!is_asked(scenario)) continue;
+      const std::string fault = fault_of(scenario, seed, errors);
+      if (fault.empty()) continue;
+      found = {.seed = seed, .reason = fault};
+      break;
+    }
   }
   seeds::planted_number = 0;
   found.reached = *seeds::reached;

@@ -1,0 +1,296 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// A scenario of the seeds: rules act on components, while values change, parts behave badly and a client makes changes.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
+
+#include "scenario/rule_history.hpp"
+#include "scenario/rule_parts.hpp"
+
+namespace mauve::testing {
+
+class RandomRules {
+ public:
+  RandomRules(std::uint64_t seed, seeds::Findings& findings)
+      : dice_(seed),
+        findings_(findings),
+        interferes_(dice_.once_in(2)),
+        contends_(dice_.once_in(2)),
+        behaves_badly_(dice_.once_in(2)) {}
+
+  void run() {
+    {
+      PluginRegistry registry;
+      register_rule_parts(registry);
+      Architecture architecture(&registry);
+      architecture_ = &architecture;
+      declare();
+      Deployer deployer(architecture);
+      deployer_ = &deployer;
+      deployer.deploy();
+      sleep_for(dice_.between(ms_to_ns(10), ms_to_ns(30)));
+      for (int loads = 1 + dice_.below(2); loads > 0; --loads) run_rules(loads == 1);
+      deployer.shutdown();
+    }
+    for (int tries = 0; tries < 1000 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
+    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+  }
+
+ private:
+  static constexpr double kMost = 10.0;
+
+  void expect(bool is_true, const std::string& otherwise) { findings_.expect(is_true, otherwise); }
+  int any_component() { return dice_.below(components_); }
+  static std::string component(int index) { return "c" + std::to_string(index); }
+
+  void declare() {
+    components_ = 2 + dice_.below(3);
+    for (int i = 0; i < 3; ++i) architecture_->add_resource<SharedData<Number>>("beat" + std::to_string(i));
+    for (int i = 0; i < components_; ++i) {
+      Component& added = architecture_->add_component(component(i), "r/Shell", "r/First", "r/Fsm",
+                                                      {.priority = 10 + 10 * dice_.below(4)});
+      added.allow({kRuleCores.begin() + 1, kRuleCores.end()}, true);
+      added.set_property("period_ms", std::int64_t{2 + dice_.below(8)});
+    }
+    architecture_->configure();
+  }
+
+  // ---- the rules
+
+  KnownRule any_rule(int number) {
+    KnownRule known;
+    known.beat = "beat" + std::to_string(dice_.below(3));
+    known.above = 1.0 + dice_.below(8);
+    known.is_negated = dice_.once_in(4);
+    rules::When value{
+        .kind = "value",
+        .parameters = {{"resource", known.beat}, {"field", std::string("value")}, {"above", known.above}}};
+    const std::string about = component(contends_ ? any_component() : number);
+    known.rule = {.name = "rule" + std::to_string(number),
+                  .when = known.is_negated ? rules::When{.kind = "not", .parts = {value}} : value,
+                  .for_ns = dice_.once_in(2) ? 0 : dice_.between(ms_to_ns(1), ms_to_ns(15)),
+                  .undoes = !dice_.once_in(4),
+                  .undo_for_ns = dice_.once_in(2) ? 0 : dice_.between(ms_to_ns(1), ms_to_ns(15)),
+                  .cooldown_ns = dice_.once_in(2) ? 0 : ms_to_ns(5),
+                  .priority = dice_.below(3),
+                  .about = {about}};
+    if (dice_.once_in(3)) known.rule.otherwise_after_ns = dice_.between(ms_to_ns(5), ms_to_ns(60));
+    enter_actions(known, about);
+    return known;
+  }
+  void enter_actions(KnownRule& known, const std::string& about) {
+    rules::RuleActions& actions = known.actions;
+    RuleDeed deed = static_cast<RuleDeed>(1 + dice_.below(2));
+    if (behaves_badly_ && dice_.once_in(2)) deed = static_cast<RuleDeed>(3 + dice_.below(5));
+    known.is_good = deed == RuleDeed::good || deed == RuleDeed::other || deed == RuleDeed::slow;
+    switch (dice_.below(5)) {
+      case 0:
+        actions.do_steps = {
+            {.kind = "set_property", .target = about, .name = "gain", .value = 3.0 + dice_.below(3)}};
+        actions.undo_steps = {{.kind = "set_property", .target = about, .name = "gain", .value = 1.0}};
+        known.is_good = true;
+        break;
+      case 1:
+        actions.do_steps = {{.kind = "stop", .target = about}};
+        actions.undo_steps = {{.kind = "start", .target = about}};
+        known.is_good = false;  // it disarms itself
+        break;
+      default:
+        actions.do_steps = {{.kind = "replace_core", .target = about, .name = name_of(deed)}};
+        actions.undo_steps = {{.kind = "replace_core", .target = about, .name = "r/First"}};
+    }
+    if (!known.rule.undoes) actions.undo_steps.clear();
+    const TransactionOptions options{
+        .timeouts = {.commit_ns = ms_to_ns(dice_.once_in(2) ? 30 : 200), .phase_ns = 0}};
+    actions.do_options = actions.undo_options = options;
+    actions.reserve = dice_.once_in(2) ? rules::ReserveKind::stop : rules::ReserveKind::safe_outputs;
+  }
+
+  /// One set of rules, from its loading to its end.
+  void run_rules(bool is_last) {
+    known_.clear();
+    const int count = contends_ ? 2 + dice_.below(4) : components_;
+    std::vector<rules::Rule> rules;
+    std::vector<rules::RuleActions> actions;
+    for (int i = 0; i < count; ++i) {
+      known_.push_back(any_rule(i));
+      rules.push_back(known_.back().rule);
+      actions.push_back(known_.back().actions);
+    }
+    rules::RuleRunner runner(*deployer_, std::make_unique<rules::Engine>(rules), actions);
+    runner_ = &runner;
+    RuleHistory history(known_, beats_, findings_);
+    history_ = &history;
+    has_interfered_ = false;
+    runner.start();
+    RuleParts::may_hang = true;
+    is_over_ = false;
+    OrdinaryThread taker([this] {
+      while (!is_over_) history_->add(runner_->wait_told(ms_to_ns(20)));
+    });
+    for (int requests = 3 + dice_.below(12); requests > 0; --requests) {
+      sleep_for(dice_.between(0, ms_to_ns(dice_.once_in(4) ? 40 : 8)));
+      request();
+    }
+    const bool is_cut = dice_.once_in(3);
+    if (!is_cut) expect_settled();
+    RuleParts::hung_may_go_on = true;
+    if (is_last && dice_.once_in(3)) deployer_->shutdown();
+    const time_ns_t stopped_ns = seeds::now_ns();
+    runner.stop();
+    is_over_ = true;
+    runner.wake();
+    taker.join();
+    history.add(runner.wait_told(0));
+    history.check(runner.lost(), stopped_ns);
+    expect_still();
+    RuleParts::may_hang = false;
+    RuleParts::hung_may_go_on = is_last;
+  }
+
+  // ---- the client
+
+  void request() {
+    if (interferes_ && dice_.once_in(3)) return interfere();
+    if (dice_.once_in(8)) return expect_seen();
+    const std::string name = "beat" + std::to_string(dice_.below(3));
+    beat(name, kMost * dice_.below(11) / 10.0);
+    if (dice_.once_in(4)) beat(name, kMost * dice_.below(11) / 10.0);  // at once again
+  }
+  void beat(const std::string& name, double value) {
+    beats_[name].push_back({.value = value, .began_ns = seeds::now_ns()});
+    findings_.note(name + " = " + std::to_string(value));
+    static_cast<SharedData<Number>&>(architecture_->resource(name)).write.write({value}, monotonic_now_ns());
+  }
+  void interfere() {
+    has_interfered_ = true;
+    const std::string name = component(any_component());
+    const int what = dice_.below(5);
+    findings_.note("interferes with " + name + ": " + std::to_string(what));
+    try {
+      switch (what) {
+        case 0:
+          deployer_->stop(name, {.timeout_ns = dice_.between(0, ms_to_ns(30)), .force = dice_.once_in(2)});
+          break;
+        case 1:
+          deployer_->start(name);
+          break;
+        case 2:
+          deployer_->set_property(name, "gain", 1.0 + dice_.below(4),
+                                  {.commit_ns = ms_to_ns(50), .phase_ns = 0});
+          break;
+        case 3:
+          deployer_->abandon(name);
+          break;
+        default:
+          deployer_->replace_core(name, name_of(static_cast<RuleDeed>(dice_.below(3))),
+                                  {.commit_ns = ms_to_ns(50), .phase_ns = 0});
+      }
+    } catch (const Error& error) {
+      expect(error.code() != ErrorCode::internal, std::string("internal error: ") + error.what());
+    }
+  }
+
+  // ---- what must hold
+
+  double value_of_beat(const std::string& name) {
+    return beats_[name].empty() ? 0.0 : beats_[name].back().value;
+  }
+  /// What was written a while ago, each rule that watches knows.
+  void expect_seen() {
+    pause(RuleHistory::kSeen);
+    const std::vector<rules::RuleFacts> facts = runner_->facts();
+    for (std::size_t i = 0; i < known_.size(); ++i) {
+      const KnownRule& known = known_[i];
+      const std::vector<Beat>& beats = beats_[known.beat];
+      if (!facts[i].status.armed || !was_armed(i) || beats.empty()) continue;
+      findings_.count("conditions seen");
+      expect(facts[i].status.holds == known.holds(beats.back().value),
+             known.rule.name + " does not know that " + known.beat + " is " +
+                 std::to_string(beats.back().value));
+    }
+  }
+  /// Armed for so long that it has heard the last value; what came before it was armed does not count.
+  bool was_armed(std::size_t index) const {
+    const rules::RuleFacts facts = runner_->facts()[index];
+    const auto beats = beats_.find(known_[index].beat);
+    return facts.status.armed && beats != beats_.end() && !beats->second.empty() &&
+           beats->second.back().began_ns > armed_ns(index);
+  }
+  time_ns_t armed_ns(std::size_t index) const { return history_->armed_ns(static_cast<int>(index)); }
+  static void pause(time_ns_t length_ns) {
+    time_ns_t stalled_ns = -1;
+    do {
+      stalled_ns = seeds::outcome().stalled_ns;
+      sleep_for(length_ns);
+    } while (seeds::outcome().stalled_ns > stalled_ns + ms_to_ns(1));
+  }
+
+  /// Once nothing else happens, what the rules want is in force.
+  void expect_settled() {
+    for (const KnownRule& known : known_) {  // each rule hears once more, after it was armed
+      beat(known.beat, value_of_beat(known.beat));
+    }
+    expect_seen();
+    pause(ms_to_ns(700));  // the first retry is after 500 ms
+    const std::vector<rules::RuleFacts> facts = runner_->facts();
+    for (std::size_t i = 0; i < known_.size(); ++i) {
+      const KnownRule& known = known_[i];
+      const rules::RuleStatus& status = facts[i].status;
+      const auto task_state = architecture_->component(known.rule.about.front()).task().state();
+      if (!status.armed || !was_armed(i) || beats_[known.beat].empty()) continue;
+      const bool is_alone =
+          std::ranges::count_if(known_, [&](const KnownRule& other) { return other.contends(known); }) == 1;
+      const std::string what = known.rule.name + ", problem '" + facts[i].problem + "', component in state " +
+                               std::to_string(static_cast<int>(task_state)) + ": ";
+      if (!has_interfered_ && is_alone)
+        expect(!history_->has_told(static_cast<int>(i), rules::Why::changed_by_another),
+               what + "takes a change for one of somebody else");
+      if (!is_alone || !known.is_good || RuleParts::hung_states > 0) continue;
+      findings_.count("rules settled");
+      if (status.holds && !status.changed_by_another)
+        expect(status.in_effect, what + "its condition holds, and it is not in effect");
+      if (!status.holds) expect(!status.in_effect || !known.rule.undoes, what + "it is not undone");
+      if (status.in_effect) expect_in_place(known, what);
+    }
+  }
+  void expect_in_place(const KnownRule& known, const std::string& what) {
+    const std::optional<bool> is_so = rules::is_in_place(known.actions.do_steps, architecture_->describe());
+    expect(is_so.value_or(true), what + "it is in effect, and what it does is not there");
+  }
+  /// The runner has ended: nothing changes any more.
+  void expect_still() {
+    const std::uint64_t revision = architecture_->revision();
+    sleep_for(ms_to_ns(30));
+    const bool is_hung = RuleParts::hung_states > 0 || RuleParts::hung_hooks > 0;
+    expect(is_hung || architecture_->revision() == revision,
+           "the architecture changes after the end of the rules");
+  }
+
+  Dice dice_;
+  seeds::Findings& findings_;
+  bool interferes_;     // the client with what rules do
+  bool contends_;       // rules with each other
+  bool behaves_badly_;  // parts of rules
+  Architecture* architecture_{nullptr};
+  Deployer* deployer_{nullptr};
+  rules::RuleRunner* runner_{nullptr};
+  RuleHistory* history_{nullptr};
+  int components_{0};
+  std::vector<KnownRule> known_;
+  std::map<std::string, std::vector<Beat>> beats_;
+  bool has_interfered_{false};
+  bool is_over_{false};
+};
+
+inline void random_rules(std::uint64_t seed, seeds::Findings& findings) { RandomRules(seed, findings).run(); }
+
+}  // namespace mauve::testing

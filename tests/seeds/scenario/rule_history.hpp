@@ -1,0 +1,175 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// What the rules of random_rules have decided, and what must hold of it.
+#pragma once
+
+#include <algorithm>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/rules/rule_runner.hpp"
+
+#include "../forked_run.hpp"
+
+namespace mauve::testing {
+
+/// A rule as the scenario knows it.
+struct KnownRule {
+  rules::Rule rule{};
+  rules::RuleActions actions{};
+  std::string beat{};  // the resource whose value its condition asks for
+  double above{0.0};
+  bool is_negated{false};
+  bool is_good{false};  // none of its parts behaves badly
+
+  bool holds(double value) const { return (value > above) != is_negated; }
+  bool contends(const KnownRule& other) const { return rule.about == other.rule.about; }
+};
+
+/// A value of a beat, from a write on.
+struct Beat {
+  double value;
+  time_ns_t began_ns;
+};
+
+/// Checks all decisions of one runner, in the order of their numbers.
+class RuleHistory {
+ public:
+  static constexpr time_ns_t kLongestAction = ms_to_ns(300);
+  static constexpr time_ns_t kSeen = ms_to_ns(40);  // from a write to the decision that it leads to
+
+  RuleHistory(const std::vector<KnownRule>& rules, std::map<std::string, std::vector<Beat>>& beats,
+              seeds::Findings& findings)
+      : rules_(rules), beats_(beats), findings_(findings) {}
+
+  void add(std::vector<rules::Told> told) {
+    for (rules::Told& one : told) {
+      if (one.decision.decided == rules::Decided::armed) armed_ns_[one.decision.rule] = one.decision.stamp_ns;
+      all_.push_back(std::move(one));
+    }
+  }
+  /// When the rule was armed last, so far as it was told.
+  time_ns_t armed_ns(int rule) const {
+    const auto found = armed_ns_.find(rule);
+    return found != armed_ns_.end() ? found->second : kForever;
+  }
+  /// `lost`: of the runner, which was stopped at that instant.
+  void check(std::uint64_t lost, time_ns_t stopped_ns) {
+    std::ranges::stable_sort(all_, {}, &rules::Told::number);
+    for (std::size_t i = 1; i < all_.size(); ++i) {
+      expect(all_[i].number != all_[i - 1].number,
+             "decision " + std::to_string(all_[i].number) + " is told twice");
+      expect(lost != 0 || all_[i].number <= all_[i - 1].number + 1,
+             "no decision " + std::to_string(all_[i - 1].number + 1) + " is told");
+    }
+    std::vector<Life> lives(rules_.size());
+    for (const rules::Told& told : all_) follow(told, lives);
+    for (std::size_t i = 0; i < lives.size(); ++i)
+      expect(!lives[i].under_way || stopped_ns - lives[i].begun_ns < kLongestAction,
+             rules_[i].rule.name + " has begun an action that has no outcome");
+    findings_.count("decisions", static_cast<int>(all_.size()));
+  }
+  bool has_told(int rule, rules::Why why) const {
+    return std::ranges::any_of(all_, [&](const rules::Told& told) {
+      return told.decision.rule == rule && told.decision.why == why;
+    });
+  }
+  bool has_told(int rule, rules::Decided decided) const {
+    return std::ranges::any_of(all_, [&](const rules::Told& told) {
+      return told.decision.rule == rule && told.decision.decided == decided;
+    });
+  }
+
+ private:
+  struct Life {
+    std::optional<rules::Act> under_way{};  // do or undo
+    bool is_in_reserve{false};
+    bool is_armed{false};
+    time_ns_t stamp_ns{0};
+    time_ns_t begun_ns{0};
+  };
+
+  void expect(bool is_true, const std::string& otherwise) { findings_.expect(is_true, otherwise); }
+
+  void follow(const rules::Told& told, std::vector<Life>& lives) {
+    using rules::Act;
+    using rules::Decided;
+    const rules::Decision& decision = told.decision;
+    const auto index = static_cast<std::size_t>(decision.rule);
+    const KnownRule& known = rules_[index];
+    Life& life = lives[index];
+    const std::string what = known.rule.name + ", decision " + std::to_string(told.number) + " (" +
+                             std::string(rules::name_of(decision.decided)) + "): ";
+    findings_.note(what + std::to_string(decision.stamp_ns / 1000 - 1'000'000'000) + " us, act " +
+                   std::to_string(static_cast<int>(decision.act)) + ", why " +
+                   std::string(rules::words_of(decision.why)));
+    findings_.count("decided " + std::string(rules::name_of(decision.decided)));
+    expect(decision.stamp_ns >= life.stamp_ns, what + "is made before the one before it");
+    life.stamp_ns = decision.stamp_ns;
+    switch (decision.decided) {
+      case Decided::armed:
+      case Decided::disarmed:
+        expect(life.is_armed != (decision.decided == Decided::armed), what + "it was so before");
+        life.is_armed = decision.decided == Decided::armed;
+        break;
+      case Decided::do_:
+      case Decided::undo:
+        expect(!life.under_way, what + "an action is under way");
+        for (std::size_t k = 0; k < lives.size(); ++k)
+          expect(k == index || !rules_[k].contends(known) || !lives[k].under_way,
+                 what + "the action of " + rules_[k].rule.name + " about the same is under way");
+        life.under_way = decision.act;
+        life.begun_ns = decision.stamp_ns;
+        check_cause(decision, known, what);
+        break;
+      case Decided::otherwise:
+        life.is_in_reserve = true;
+        break;
+      case Decided::done:
+      case Decided::failed:
+        if (decision.act == Act::otherwise) {
+          expect(life.is_in_reserve, what + "it was not begun");
+          life.is_in_reserve = false;
+          break;
+        }
+        expect(life.under_way == decision.act, what + "it was not begun");
+        expect((decision.decided == Decided::done) == told.action.report.has_value() ||
+                   (decision.decided == Decided::done && !told.action.failure.empty()),
+               what + "its report says otherwise: " + told.action.failure);
+        life.under_way.reset();
+        break;
+      default:
+        break;
+    }
+  }
+
+  /// What begins has had its condition for long enough.
+  void check_cause(const rules::Decision& decision, const KnownRule& known, const std::string& what) {
+    const bool does = decision.decided == rules::Decided::do_;
+    const time_ns_t dwell_ns = does ? known.rule.for_ns : known.rule.undo_for_ns;
+    expect(decision.cause_ns == 0 || decision.stamp_ns - decision.cause_ns >= dwell_ns,
+           what + "after " + std::to_string(decision.stamp_ns - decision.cause_ns) + " ns, expected " +
+               std::to_string(dwell_ns));
+    // Armed anew, a value is not known before it is written again: the condition does not hold, negated it does.
+    if (known.is_negated || !does) return;
+    const std::vector<Beat>& beats = beats_[known.beat];
+    const time_ns_t slack_ns = kSeen + seeds::outcome().stalled_ns;
+    bool was_so = false;
+    for (std::size_t i = 0; i < beats.size(); ++i) {
+      const time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns + slack_ns : kForever;
+      was_so = was_so || (known.holds(beats[i].value) && beats[i].began_ns <= decision.stamp_ns &&
+                          decision.stamp_ns <= end_ns);
+    }
+    expect(was_so || beats.empty(), what + "its condition was not so, stamp " +
+                                        std::to_string(decision.stamp_ns / 1000 - 1'000'000'000));
+  }
+
+  const std::vector<KnownRule>& rules_;
+  std::map<std::string, std::vector<Beat>>& beats_;
+  seeds::Findings& findings_;
+  std::vector<rules::Told> all_;
+  std::map<int, time_ns_t> armed_ns_;
+};
+
+}  // namespace mauve::testing

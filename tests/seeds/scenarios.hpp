@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// The scenarios of the seeds: test_seeds runs each of them, test_mutants runs all of them with each seed.
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "forked_run.hpp"
+#include "random_architecture.hpp"
+#include "random_data.hpp"
+#include "random_ends.hpp"
+#include "random_rules.hpp"
+
+namespace mauve::testing {
+
+struct SeedScenario {
+  const char* name;
+  void (*run)(std::uint64_t seed, seeds::Findings& findings);
+};
+
+inline constexpr std::array kScenarios = std::to_array<SeedScenario>({
+    {"random_architecture", random_architecture},
+    {"random_data", random_data},
+    {"random_ends", random_ends},
+    {"random_rules", random_rules},
+});
+
+}  // namespace mauve::testing
