@@ -204,6 +204,11 @@ class DataCore : public Core<DataShell> {
                    });
     }
     seeds::compute(dice_.between(0, us_to_ns(60)));
+    if (dice_.once_in(3)) {  // late, where a change is made meanwhile
+      if (dice_.once_in(4)) seeds::compute(us_to_ns(800));
+      write(ports.small_out);
+      write(ports.wide_out);
+    }
     if (habits_.hogs && dice_.once_in(12)) seeds::compute(kHogs);
   }
   bool adopt(const CoreBase& /*old*/) override { return true; }
@@ -312,5 +317,19 @@ struct DataEventFsm : Fsm<DataShell, DataCore> {
     next(pause, run);
   }
 };
+
+inline std::unique_ptr<FsmBase> data_fsm(Awaited awaited) {
+  switch (awaited) {
+    case Awaited::raise:
+      return new_part<FsmBase, DataEventFsm<Awaited::raise>>();
+    case Awaited::small:
+      return new_part<FsmBase, DataEventFsm<Awaited::small>>();
+    case Awaited::queue:
+      return new_part<FsmBase, DataEventFsm<Awaited::queue>>();
+    case Awaited::nothing:
+      break;
+  }
+  return new_part<FsmBase, DataFsm>();
+}
 
 }  // namespace mauve::testing
