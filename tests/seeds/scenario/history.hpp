@@ -159,6 +159,9 @@ class History {
     findings_.expect(waited_ns >= EventFsm::kApart,
                      where(execution) + " comes " + std::to_string(waited_ns) + " ns after the last release");
     findings_.count("event waits");
+    const bool is_excused = hung_.contains(execution.component) || execution.excuses_ns != last.excuses_ns;
+    const time_ns_t late_ns = execution.at_ns - std::max(execution.clock_ns, last.at_ns);
+    findings_.expect(is_excused || late_ns <= kLate, where(execution) + " is late");
     if (waited_ns < EventFsm::kTimeout || last.input != execution.input) return;
     findings_.count("event waits that timed out");
     const auto writes = shared.writes.find(static_cast<int>(execution.input - written_by(0)));
@@ -241,6 +244,7 @@ class History {
     findings_.expect(false, where(execution) + " is not on its grid");
   }
 
+  static constexpr time_ns_t kLate = ms_to_ns(20);    // a wake-up was lost: the wait lasts to its timeout
   static constexpr time_ns_t kUnclear = ms_to_ns(3);  // an event may be before the wait, or after it
 
   seeds::Findings& findings_;

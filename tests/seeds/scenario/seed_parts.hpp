@@ -37,7 +37,8 @@ struct Execution {
   double input;        // what the component reads
   std::int64_t count;  // executions that the core's state knows of
   bool is_in_shadow;
-  int interventions;  // requests before it
+  int interventions;     // requests before it
+  time_ns_t excuses_ns;  // stalls and slowness before it
 };
 
 /// A core that does not return from a hook or a state.
@@ -138,7 +139,8 @@ class SeedCore : public Core<TestShell> {
                                    .input = shell().input.read().value.value,
                                    .count = ++count_,
                                    .is_in_shadow = is_in_shadow,
-                                   .interventions = shared_->interventions});
+                                   .interventions = shared_->interventions,
+                                   .excuses_ns = seeds::outcome().stalled_ns + shared_->slow_ns});
     ++copied_;
     expect(copied_ == count_, "has other state fields than take() moved over: " + std::to_string(copied_) +
                                   " and " + std::to_string(count_));
@@ -158,6 +160,7 @@ class SeedCore : public Core<TestShell> {
     expect(!is_ready_, "is configured twice");
     const bool agrees = behave(Hook::configure);
     is_ready_ = agrees;
+    is_out_ = false;  // an old core may be the next fallback
     return agrees;
   }
   void cleanup_hook() override {
