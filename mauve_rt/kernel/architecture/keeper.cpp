@@ -107,17 +107,19 @@ std::uint64_t Keeper::taken() const {
 void Keeper::wait(std::uint64_t first, time_ns_t until_ns) const {
   const LockGuard lock(state_->mutex);
   const std::uint64_t taken = state_->taken;
+  time_ns_t now_ns = monotonic_now_ns();
   const auto is_awaited = [&](const auto& each) {
     const State::Lane& lane = each.second;
     if (lane.oldest() == 0 || lane.oldest() > taken) return false;
     const bool is_anothers = lane.at != 0 && lane.at <= first;
-    return !is_anothers || monotonic_now_ns() - lane.busy.since_ns <= kAnothers;
+    return !is_anothers || now_ns - lane.busy.since_ns <= kAnothers;
   };
   const auto is_own = [](const auto& each) { return each.second.thread == std::this_thread::get_id(); };
   const auto& lanes = state_->lanes;
   if (std::any_of(lanes.begin(), lanes.end(), is_own)) return;
-  while (monotonic_now_ns() < until_ns && std::any_of(lanes.begin(), lanes.end(), is_awaited))
-    state_->changed.wait_until(state_->mutex, monotonic_now_ns() + ms_to_ns(20));
+  for (; now_ns < until_ns && std::any_of(lanes.begin(), lanes.end(), is_awaited);
+       now_ns = monotonic_now_ns())
+    state_->changed.wait_until(state_->mutex, now_ns + ms_to_ns(20));
 }
 
 Keeper::Busy Keeper::busy() const {
