@@ -3,6 +3,8 @@
 #include <sched.h>
 #include <unistd.h>
 
+#include <utility>
+
 #include "free_fsm.hpp"
 
 namespace mauve::testing::test_rule11_fallback {
@@ -106,7 +108,7 @@ TEST_F(Rule11Fallback, CleanupAndConfigureGiveTheDeclaredCoreAnotherChance) {
 
 struct CoreWithCleanup : TestCore {
   std::function<void()> at_cleanup = [] {};
-  void cleanup_hook() override { at_cleanup(); }
+  void cleanup_hook() override { std::exchange(at_cleanup, [] {})(); }  // once
 };
 
 TEST_F(Rule11Fallback, NoStartComesIntoACleanup) {
