@@ -108,7 +108,9 @@ TEST_F(Rule11Fallback, CleanupAndConfigureGiveTheDeclaredCoreAnotherChance) {
 
 struct CoreWithCleanup : TestCore {
   std::function<void()> at_cleanup = [] {};
-  void cleanup_hook() override { std::exchange(at_cleanup, [] {})(); }  // once
+  void cleanup_hook() override {
+    std::exchange(at_cleanup, [] {})();
+  }  // once
 };
 
 TEST_F(Rule11Fallback, NoStartComesIntoACleanup) {

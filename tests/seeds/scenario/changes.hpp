@@ -307,7 +307,8 @@ class Changes : protected Checks {
     if (way == 3 && !may_prepare) way = 0;
     if (way == 3) draft.options.force = false;
     draft.began_ns = seeds::now_ns();
-    timed(draft.text, longest_ns, kPrompt + timeouts.phase_ns, [&] {
+    const time_ns_t prompt_ns = kPrompt + timeouts.phase_ns + (two_change_ ? ms_to_ns(80) : 0);
+    timed(draft.text, longest_ns, prompt_ns, [&] {
       try {
         if (way == 3) {
           draft.report = commit_prepared(dice, draft, here);
