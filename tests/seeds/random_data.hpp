@@ -395,6 +395,7 @@ class RandomData {
   void expect_seen(const Part& part, int index) {
     const ResourceHistory& history = shared_->resources[part.wires.at("small_in")];
     if (history.writes.empty() || history.writes.back().began < part.wired) return;
+    if (!shared_->last_small.contains(index)) return;
     Resource& resource = architecture_->resource(history.name);
     double found = 0.0;
     resource.read_number(resource.find_number("numbers[0]").value(), found);

@@ -73,10 +73,20 @@ void run_seeds(const Scenario& scenario, std::uint64_t count) {
     std::printf("%12lld %s\n", static_cast<long long>(times), what.c_str());
 }
 
+/// Leaves other addresses and other rubbish in free memory to the next run.
+void disturb_heap() {
+  std::vector<std::string> kept;
+  for (std::size_t length = 8; length < 5000; length += 24) {
+    const std::string freed(length, 'r');
+    kept.emplace_back(length, 'k');
+  }
+}
+
 template <typename Scenario>
 void run_twice(const Scenario& scenario, std::uint64_t seed) {
   const std::string file = seeds::variable("MAUVE_SEED_TRACE");
   const Run one = run_forked(scenario, seed, file);
+  disturb_heap();
   const Run other = run_forked(scenario, seed, file.empty() ? "" : file + ".again");
   EXPECT_EQ(0, one.status);
   EXPECT_GT(one.outcome.calls, 0U);

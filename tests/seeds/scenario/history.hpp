@@ -111,6 +111,10 @@ class History {
     const auto place = last_.find(execution.component);
     if (place == last_.end() || sporadic_.contains(execution.component)) return;
     const Execution& last = *place->second;
+    const bool has_new_epoch = std::ranges::any_of(epochs_, [&](const Epoch& epoch) {
+      return epoch.began_ns <= execution.at_ns && epoch.ended_ns >= last.at_ns;
+    });
+    if (has_new_epoch) return;  // it moves the instant that is due
     for (const Visit& visit : shared.visits) {
       if (visit.component != execution.component || visit.from_ns < last.at_ns ||
           visit.to_ns > execution.at_ns)
@@ -244,7 +248,7 @@ class History {
     findings_.expect(false, where(execution) + " is not on its grid");
   }
 
-  static constexpr time_ns_t kLate = ms_to_ns(20);    // a wake-up was lost: the wait lasts to its timeout
+  static constexpr time_ns_t kLate = ms_to_ns(60);    // a wake-up was lost: the wait lasts to its timeout
   static constexpr time_ns_t kUnclear = ms_to_ns(3);  // an event may be before the wait, or after it
 
   seeds::Findings& findings_;

@@ -318,7 +318,7 @@ struct BoundedFsm : Fsm<TestShell, SeedCore> {
 
 /// act -> wait for a write to what `input` reads -> act
 struct EventFsm : Fsm<TestShell, SeedCore> {
-  static constexpr time_ns_t kTimeout = ms_to_ns(30);
+  static constexpr time_ns_t kTimeout = ms_to_ns(90);
   static constexpr time_ns_t kApart = us_to_ns(700);
   void define() override {
     State& run = execution("Run", "act", &SeedCore::act);
