@@ -9,6 +9,7 @@
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/base/thread_safety.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/run/cut.hpp"
 
