@@ -195,18 +195,19 @@ class ResynchroniseHung : public Deployed {};
 
 /// A component of its name that takes its place, or itself once it was repaired, starts on the new epoch.
 TEST_F(ResynchroniseHung, OneThatWasGivenUpTakesItToo) {
-  std::atomic<bool> may_end{false};
+  const auto may_end = std::make_shared<std::atomic<bool>>(false);
   add("first");
   Component& hung = add("hung");
-  core(hung).work = [&] {
-    while (!may_end) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+  core(hung).work = [may_end] {
+    while (!*may_end) std::this_thread::sleep_for(std::chrono::milliseconds(1));
   };
   deploy();
   wait_runs(hung, 1);
   EXPECT_TRUE(deployer.stop("hung", StopOptions{.timeout_ns = 0, .force = true}));
   deployer.commit(std::move(Transaction().resynchronise()));
   EXPECT_EQ(architecture.deployment_epoch_ns(), hung.task().grid().reference_ns);
-  may_end = true;
+  *may_end = true;
+  wait_until([&] { return hung.task().is_parked(); }, "the end of the state");
 }
 
 TEST(ResynchroniseUndeployed, IsRefused) {
