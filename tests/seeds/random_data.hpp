@@ -292,7 +292,7 @@ class RandomData {
     }
   }
 
-  /// From T on the resource takes no earlier write, of nobody; where no component ran, the kernel tells no T.
+  /// From T on the resource takes no earlier write of any writer; where no component ran, the kernel reports no T.
   void note_moved(const std::string& resource, time_ns_t instant_ns) {
     shared_->resources[resource].moved.push_back(instant_ns != kNotMeasured ? instant_ns : seeds::now_ns());
   }
@@ -332,7 +332,7 @@ class RandomData {
       instant_ns =
           deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(400)}}).instant_ns;
     });
-    // The extra component gains writing ends: they take no earlier write any more, of nobody.
+    // The extra component gains writing ends: from then on these ends take no earlier write of any writer.
     if (is_made && !has_extra_) {
       for (const std::string& gained : {std::string("shared_small"), extra_queue_})
         note_moved(gained, instant_ns);

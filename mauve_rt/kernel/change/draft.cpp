@@ -100,6 +100,7 @@ void Draft::release() noexcept {
 }
 
 bool Draft::is_structural() const noexcept {
+  if (resynchronise_step_ != 0) return true;  // about all components: none comes meanwhile
   if (!removed_components_.empty() || !resources_.empty() || !removed_resources_.empty()) return true;
   return std::any_of(components_.begin(), components_.end(), [](const DraftComponent& component) {
     return component.is_added || component.shell_step != 0 || component.wires != component.wires_before;

@@ -113,7 +113,8 @@ class Draft {
     return is_claiming;
   }
   const std::vector<std::shared_ptr<Component>>& claimed() const noexcept { return claimed_; }
-  /// Whether it adds or removes something, wires a port, or replaces a shell: of such changes one at a time is made.
+  /// Whether it adds or removes something, wires a port, replaces a shell, or gives all components a new epoch: of such changes
+  /// one at a time is made.
   bool is_structural() const noexcept;
 
   /// Marks it as touched by this step. Throws Error: unknown_component.

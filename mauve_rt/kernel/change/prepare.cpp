@@ -145,16 +145,16 @@ void TransactionCommit::Work::prepare() {
     at_step(resource.added_step, [&] { prepare_resource(resource); });
   for (DraftComponent& component : draft_->removed_components())
     at_step(component.first_step, [&] { prepare_removed(component); });
-  // Promotes last: from there on the change acts on a core that is in use, and is not called off.
-  for (const bool promotes : {false, true}) {
-    for (DraftComponent& component : draft_->components()) {
-      if ((component.promoted != nullptr) != promotes) continue;
-      if (component.is_added) {
-        at_step(component.first_step, [&] { prepare_added(component); });
-      } else {
-        prepare_change(component);
-      }
+  for (DraftComponent& component : draft_->components()) {
+    if (component.is_added) {
+      at_step(component.first_step, [&] { prepare_added(component); });
+    } else if (component.promoted == nullptr) {
+      prepare_change(component);
     }
+  }
+  // Promotes last: from there on the change acts on a core that is in use, and is not called off.
+  for (DraftComponent& component : draft_->components()) {
+    if (component.promoted != nullptr) prepare_change(component);
   }
   prefault_parts();
 }
@@ -308,9 +308,7 @@ void TransactionCommit::Work::give_back_candidates() noexcept {
   for (DraftComponent& changed : draft_->components()) {
     if (const auto& shadow = changed.shadow; shadow != nullptr) {
       shadow->conclude(ShadowCause::closed, changed.component->task().clock().now_ns());
-      if (shadow->begin_retirement())
-        architecture_.dispose("cleanup of the shadow of " + changed.component->description(),
-                              [shadow] { shadow->retire(); });
+      changed.component->retire_shadow(shadow);
     }
     if (!changed.is_candidate_out) continue;
     std::unique_ptr<CoreBase> core = std::move(changed.fresh.core);

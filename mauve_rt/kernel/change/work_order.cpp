@@ -39,9 +39,7 @@ EarlierChange TransactionCommit::Work::look_at_earlier() const {
 
 bool TransactionCommit::Work::is_structural() const noexcept {
   const auto& steps = transaction_.steps();
-  return std::any_of(steps.begin(), steps.end(), [](const auto& step) {
-    return step->is_structural() || step->is_for_all();  // all components: none comes while it is prepared
-  });
+  return std::any_of(steps.begin(), steps.end(), [](const auto& step) { return step->is_structural(); });
 }
 
 void TransactionCommit::Work::claim_whole() noexcept {
@@ -75,13 +73,13 @@ bool TransactionCommit::Work::wait_passed(time_ns_t until_ns) const noexcept {
 // ---- what it makes of the architecture's table
 
 void TransactionCommit::Work::prepare_publication() {
+  is_structural_ = draft_->is_structural();
   resynchronises_ = draft_->resynchronise_step() != 0;
-  is_structural_ = draft_->is_structural() || resynchronises_;  // of all components that there are
   const bool is_plain = std::all_of(changes_.begin(), changes_.end(), [](const Change& change) {
     return change.parts == nullptr && change.retreat == nullptr && !change.draft->is_added;
   });
-  is_run_only_ = is_plain && !is_structural_ && !resynchronises_ && !changes_.empty() && actions_.empty() &&
-                 repairs_.empty() && configured_anew_.empty();
+  is_run_only_ = is_plain && !is_structural_ && !changes_.empty() && actions_.empty() && repairs_.empty() &&
+                 configured_anew_.empty();
   elements_.clear();
   wires_.clear();
   added_.clear();

@@ -23,6 +23,10 @@ void Component::settle_shadow() noexcept {
   if (shadow == nullptr || !shadow->has_ended()) return;
   task_.forget_shadow(*shadow);
   shadow->detach();
+  retire_shadow(shadow);
+}
+
+void Component::retire_shadow(const std::shared_ptr<Shadow>& shadow) noexcept {
   if (shadow->begin_retirement()) dispose("cleanup of the shadow", [shadow] { shadow->retire(); });
 }
 

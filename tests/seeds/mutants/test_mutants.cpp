@@ -40,50 +40,11 @@ constexpr std::uint64_t kMostSeeds =
     10'000;  // the list of a mutant that needs more is of no use to who changes the kernel
 constexpr std::uint64_t kGoodSeeds = 300;  // of the sources as they are
 
-/// The standard error of the children, which say there why they end.
-class StandardError {
- public:
-  StandardError() : file_(memfd_create("errors", 0)), terminal_(dup(STDERR_FILENO)) {
-    dup2(file_, STDERR_FILENO);
-  }
-  ~StandardError() {
-    dup2(terminal_, STDERR_FILENO);
-    close(file_);
-    close(terminal_);
-  }
-  StandardError(const StandardError&) = delete;
-  StandardError& operator=(const StandardError&) = delete;
-
-  /// Since the last call.
-  std::string take() {
-    std::string text;
-    char part[4096];
-    lseek(file_, 0, SEEK_SET);
-    for (ssize_t length = 0; (length = read(file_, part, sizeof(part))) > 0;)
-      text.append(part, static_cast<std::size_t>(length));
-    [[maybe_unused]] const int cut = ftruncate(file_, 0);
-    lseek(file_, 0, SEEK_SET);
-    return text;
-  }
-
- private:
-  int file_;
-  int terminal_;
-};
-
-/// A contract that is broken in a component's own code ends in a fault of the component, as any exception there: the run itself
-/// may go on.
-constexpr const char* kBrokenContract = ": broken ";
-
-std::string line_with(const std::string& text, std::size_t at) {
-  const std::size_t begin = text.rfind('\n', at) + 1;
-  return text.substr(begin, text.find('\n', at) - begin);
-}
-
 /// What was wrong with a run, in one line.
-std::string reason(const Run& run, const std::string& errors) {
-  if (const std::size_t broken = errors.find(kBrokenContract); broken != std::string::npos)
-    return line_with(errors, broken);
+std::string reason(const Run& run) {
+  const std::string& errors = run.errors;
+  if (const std::size_t broken = errors.find(seeds::kBrokenContract); broken != std::string::npos)
+    return seeds::line_with(errors, broken);
   std::istringstream findings(run.text);
   for (std::string line; std::getline(findings, line);) {
     if (line.starts_with("  at ")) return line.substr(2);
@@ -91,7 +52,7 @@ std::string reason(const Run& run, const std::string& errors) {
   std::string line = errors.substr(0, errors.find('\n'));
   if (line.starts_with("terminate called")) {
     const std::size_t what = errors.find("what():");
-    if (what != std::string::npos) line = line_with(errors, what);
+    if (what != std::string::npos) line = seeds::line_with(errors, what);
   }
   if (WIFSIGNALED(run.status)) {
     const std::string signal = std::string("SIG") + sigabbrev_np(WTERMSIG(run.status));
@@ -107,11 +68,9 @@ struct Found {
 };
 
 /// Runs one scenario; empty: nothing was wrong.
-std::string fault_of(const SeedScenario& scenario, std::uint64_t seed, StandardError& errors) {
+std::string fault_of(const SeedScenario& scenario, std::uint64_t seed) {
   const Run run = seeds::run_forked(scenario.run, seed);
-  const std::string text = errors.take();
-  const bool is_good = run.is_good() && text.find(kBrokenContract) == std::string::npos;
-  return is_good ? "" : std::string(scenario.name) + ": " + reason(run, text);
+  return run.is_good() ? "" : std::string(scenario.name) + ": " + reason(run);
 }
 
 /// Of one scenario (MAUVE_SCENARIO), or of all.
@@ -122,14 +81,13 @@ bool is_asked(const SeedScenario& scenario) {
 
 /// The first seed of which the run of a scenario is bad with this mutant.
 Found find(int number, std::uint64_t seeds) {
-  StandardError errors;
   seeds::planted_number = number;
   *seeds::reached = 0;
   Found found;
   for (std::uint64_t seed = 1; seed <= seeds && found.seed == 0; ++seed) {
     for (const SeedScenario& scenario : kScenarios) {
       if (!is_asked(scenario)) continue;
-      const std::string fault = fault_of(scenario, seed, errors);
+      const std::string fault = fault_of(scenario, seed);
       if (fault.empty()) continue;
       found = {.seed = seed, .reason = fault};
       break;
@@ -204,6 +162,7 @@ void share_reached() {
 
 int run() {
   share_reached();
+  if (std::freopen("/dev/null", "w", stderr) == nullptr) return 1;  // a bad run copies its errors there
   int first = 0;
   int last = kMutants.empty() ? 0 : kMutants.back().number;
   if (const std::string asked = seeds::variable("MAUVE_MUTANT"); !asked.empty()) {

@@ -300,9 +300,8 @@ class Changes : protected Checks {
     const CommitTimeouts timeouts = draft.options.timeouts;
     time_ns_t longest_ns = 2 * timeouts.commit_ns + timeouts.phase_ns + kPrepare + kSlack;
     if (two_change_) longest_ns *= 2;  // it waits for the other one's
-    // A change that a shutdown overtakes waits for the thread of each of its components, one after the other.
-    if (shuts_down_ || draft.owner == Owner::second)
-      longest_ns += static_cast<time_ns_t>(parts_.size()) * ms_to_ns(500);
+    // A change that a shutdown overtakes waits for the threads of its components.
+    if (shuts_down_ || draft.owner == Owner::second) longest_ns += Runner::kThreadEnd;
     int way = draft.options.dry_run || draft.resynchronises ? 0 : dice.below(4);
     if (way == 3 && !may_prepare) way = 0;
     if (way == 3) draft.options.force = false;

@@ -25,7 +25,7 @@ struct Use {
   time_ns_t stamp_ns{0};
   std::uint64_t began{0}, ended{UINT64_MAX};  // ticks
   bool has_new{false};                        // of a read: something new; of a write: accepted
-  bool may_be_dropped{false};                 // of a write: nobody has to see it
+  bool may_be_dropped{false};                 // of a write: no reader has to see it
   bool is_late_look{false};                   // of a read: may be one write behind other readers
 };
 
@@ -79,7 +79,7 @@ class DataCheck {
     }
     for (std::size_t i = 0; i < all_.log.size(); ++i) {
       expect(place_.emplace(all_.log[i], i).second, "logs " + text(all_.log[i]) + " twice");
-      expect(write_of_.contains(all_.log[i]), "logs " + text(all_.log[i]) + ", which nobody wrote");
+      expect(write_of_.contains(all_.log[i]), "logs " + text(all_.log[i]) + ", which no writer wrote");
     }
     check_known();
     if (all_.is_ring) {
@@ -103,13 +103,13 @@ class DataCheck {
   }
   const Use& write_of(double number) const { return all_.writes[write_of_.at(number)]; }
 
-  /// Nothing torn, nothing that nobody wrote, nothing before it was written.
+  /// No torn value, no value without a writer, no value before its write.
   void check_known() {
     for (const Use& read : all_.reads) {
       if (read.number == 0.0 || read.ended == UINT64_MAX) continue;
       expect(read.number != kTorn, "gives a torn value at tick " + std::to_string(read.began));
       const bool is_known = write_of_.contains(read.number);
-      expect(is_known, "gives " + text(read.number) + ", which nobody wrote");
+      expect(is_known, "gives " + text(read.number) + ", which no writer wrote");
       if (!is_known) continue;
       const Use& write = write_of(read.number);
       expect(write.began < read.ended, "gives " + text(read.number) + " before it is written");

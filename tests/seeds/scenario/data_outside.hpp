@@ -194,7 +194,7 @@ class DataOutside {
       return client(name).call.call(request, response);
     });
   }
-  /// What one component alone writes to nobody else writes to.
+  /// Not the resources to which one component alone writes.
   void write(const std::string& name, bool as_message) {
     if (shared_.resources[name].has_one_writer) return;
     if (shared_.resources[name].is_ring) {

@@ -125,7 +125,7 @@ struct DataShared {
                       what + "returns " + std::to_string(now_ns - answer.ended_ns) + " ns after its answer");
     switch (outcome) {
       case CallOutcome::answered:
-        findings.expect(answer.began_ns != 0, what + "nobody has answered it");
+        findings.expect(answer.began_ns != 0, what + "no server has answered it");
         break;
       case CallOutcome::timed_out:
         findings.expect(now_ns >= until_ns, what + "before its time is over");
@@ -133,7 +133,7 @@ struct DataShared {
                         what + "although it was answered");
         break;
       case CallOutcome::stopped:
-        findings.expect(stop_asked.contains(component), what + "and nobody has stopped the component");
+        findings.expect(stop_asked.contains(component), what + "and no client has stopped the component");
         break;
       case CallOutcome::malformed:
         findings.expect(answer.is_malformed, what + "the answer was well-formed");

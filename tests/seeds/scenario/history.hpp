@@ -235,8 +235,7 @@ class History {
     std::vector<time_ns_t> epochs;
     for (const Epoch& epoch : epochs_) {
       if (!may_be_after(execution, epoch)) continue;
-      // One that hangs has no part in a new epoch, and keeps its grid.
-      if (!may_be_before(execution, epoch) && !hung_.contains(execution.component)) epochs.clear();
+      if (!may_be_before(execution, epoch)) epochs.clear();
       epochs.push_back(epoch.epoch_ns);
     }
     for (const double period : possible(execution, Aspect::period)) {

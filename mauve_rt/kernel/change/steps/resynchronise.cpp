@@ -7,6 +7,7 @@ namespace mauve {
 constexpr StepKind steps::resynchronise{
     .name = "resynchronise",
     .target = StepTarget::all,
+    .is_structural = true,
     .words = [](const TransactionStep&) { return std::string(); },
     .draft = [](Draft& draft, TransactionStep&) { draft.resynchronise(); }};
 

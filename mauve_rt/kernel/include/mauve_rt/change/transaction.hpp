@@ -82,7 +82,7 @@ class TransactionStep {
   const std::string& component() const noexcept;
   /// Whether it has a report of every component that it touched.
   bool is_for_all() const noexcept;
-  /// Whether it adds or removes something, wires a port, or replaces a shell.
+  /// Whether it adds or removes something, wires a port, replaces a shell, or gives all components a new epoch.
   bool is_structural() const noexcept;
   /// Which element of its target it sets, as Authored::element.
   std::string element() const;

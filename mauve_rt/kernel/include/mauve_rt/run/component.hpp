@@ -373,6 +373,8 @@ class Component final : public Configurable {
   void conclude_shadow() noexcept;
   /// Takes a shadow that has ended off the ports, and cleans it up. [non-rt], the component claimed.
   void settle_shadow() noexcept;
+  /// Has one that has ended cleaned up, once. [non-rt]
+  void retire_shadow(const std::shared_ptr<Shadow>& shadow) noexcept;
 
   /// After a change of parts: cleans up the parts that are out, and makes the fallback ready for the parts that are in force, where
   /// it is of no use as it is, or one of its kind is out. Beside changes and the component's thread, where threads run. [non-rt], the
