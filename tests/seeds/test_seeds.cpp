@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The kernel under the seeded scheduler: many seeds of a scenario, and one seed twice.
-// MAUVE_SEEDS asks for so many seeds, MAUVE_SEED for the first of them, MAUVE_SEED_TRACE for a file with the calls of that one.
+// MAUVE_SEEDS asks for so many seeds, MAUVE_TWICE for so many that run twice, MAUVE_SEED for the first of them, MAUVE_SEED_TRACE for a file with the calls of that one.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -97,7 +97,7 @@ void run_twice(const Scenario& scenario, std::uint64_t seed) {
 template <typename Scenario>
 void run_twice(const Scenario& scenario) {
   const std::uint64_t first = asked("MAUVE_SEED", 1);
-  const std::uint64_t end = first + std::min<std::uint64_t>(20, asked("MAUVE_SEEDS", 20));
+  const std::uint64_t end = first + asked("MAUVE_TWICE", 20);
   for (std::uint64_t seed = first; seed < end; ++seed) run_twice(scenario, seed);
 }
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What only the whole draft shows.
 #include <algorithm>
+#include <map>
+#include <vector>
 
 #include "change/draft.hpp"
 #include "parts/lookup.hpp"
@@ -154,9 +156,13 @@ void Draft::check_port_counts() const {
     std::string component;
   };
   std::map<ServiceBase*, Count> counts;
+  // In the order of the draft: which error is found first depends on no address.
+  std::vector<ServiceBase*> services;
   for (const DraftComponent& component : components_) {
     for (const auto& [port, wire] : component.wires) {
-      Count& count = counts[wire.service];
+      const auto [place, is_first] = counts.try_emplace(wire.service);
+      if (is_first) services.push_back(wire.service);
+      Count& count = place->second;
       const auto before = component.wires_before.find(port);
       const bool stays = before != component.wires_before.end() && before->second == wire;
       count.fresh += stays && component.shell_step == 0 ? 0 : 1;
@@ -176,7 +182,10 @@ void Draft::check_port_counts() const {
   for (const auto& [component, wires] : architecture_.wiring()) {
     if (!by_name_.contains(component->name()) && !is_removed(component->name())) count_all(*wires);
   }
-  for (const auto& [service, count] : counts) {
+  for (ServiceBase* const service : services) {
+    const auto found = counts.find(service);
+    if (found == counts.end()) continue;
+    const Count& count = found->second;
     try {
       service->check_ports(count.ports + service->inputs());
       // A port that goes, in this change or in one that a late component has yet to take, has its place until then.
