@@ -101,10 +101,13 @@ bool Commit::adopt(Participant& participant) noexcept {
 
 void Commit::refuse(const Participant* participant, const CommitAction& action, std::exception_ptr why,
                     bool is_late) noexcept {
-  if (!is_refused_.exchange(true, std::memory_order_acq_rel)) {
+  RefusalState none = RefusalState::none;
+  // relaxed: who begins to write has nothing to read
+  if (refusal_state_.compare_exchange_strong(none, RefusalState::writing, std::memory_order_relaxed)) {
     refused_by_ = &action;
     refusal_ = std::move(why);
     adopt_was_late_ = is_late;
+    refusal_state_.store(RefusalState::complete, std::memory_order_release);
   }
   call_off(Off::withdrawn, participant != nullptr ? participant->task : nullptr);
 }
@@ -221,7 +224,8 @@ Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
   if (is_made()) return Outcome::made;
   if (unfit_ != nullptr) return Outcome::changed;
   await_busy(until_ns);
-  if (is_refused_.load(std::memory_order_acquire)) return Outcome::refused;
+  is_refused_ = refusal_state_.load(std::memory_order_acquire) == RefusalState::complete;
+  if (is_refused_) return Outcome::refused;
   return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
 }
 
@@ -472,7 +476,7 @@ void Commit::rethrow_refusal() const {
                 {.component = locked_out_->name(), .remedy = "try again, or allow a longer commit timeout"});
   }
   if (unfit_ != nullptr) throw_unfit();
-  if (!is_refused_.load(std::memory_order_acquire)) throw_off();
+  if (!is_refused_) throw_off();
   if (refusal_) std::rethrow_exception(refusal_);
   if (!adopt_was_late_) return;
   const time_ns_t declared = refused_by_->declared_ns();

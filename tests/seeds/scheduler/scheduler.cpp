@@ -4,11 +4,12 @@
 #include <execinfo.h>
 #include <linux/futex.h>
 #include <sched.h>
-#include <semaphore.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <cstdlib>
@@ -19,16 +20,18 @@
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/base/time.hpp"
 
+#include "seeds/happens_before.hpp"
+
 namespace mauve::seeds {
 
 // Threads count it down, one at a time. Before begin(), and in the process of the test program, it has no end.
-constinit std::uint64_t atomics_left{UINT64_MAX};
+constinit std::atomic<std::uint64_t> atomics_left{UINT64_MAX};
 
 struct Thread {
   int number{0};
   std::array<char, 16> name{};
   int priority{0};
-  sem_t baton{};
+  std::atomic<std::uint32_t> baton{0};  // 1: it is here
   pthread_t handle{};
   std::uint32_t id{0};  // as futexes with priority inheritance know it
   void* (*entry)(void*){nullptr};
@@ -97,6 +100,14 @@ struct Weather {
   }
 };
 
+/// A thread that has ended is joined by the next one, so that its stack is free at the same call in each run. ThreadSanitizer would take
+/// that for synchronization.
+#if defined(MAUVE_SEES_RACES)
+constexpr bool kIsJoined = false;
+#else
+constexpr bool kIsJoined = true;
+#endif
+
 struct Event {
   time_ns_t at_ns;
   std::int32_t thread;
@@ -135,8 +146,8 @@ constinit thread_local Thread* this_thread [[gnu::tls_model("initial-exec")]] = 
 void begin_countdown() noexcept {
   Scheduler& s = all();
   const std::uint64_t once_in = s.weather.atomic_once_in;
-  atomics_left = once_in == 0 ? 5'000 : 1 + s.random.below(2 * once_in - 1);
-  s.atomics_paid = atomics_left;
+  s.atomics_paid = once_in == 0 ? 5'000 : 1 + s.random.below(2 * once_in - 1);
+  atomics_left.store(s.atomics_paid, std::memory_order_relaxed);
 }
 
 void note(const Thread& thread, Call call) noexcept {
@@ -170,8 +181,9 @@ void let_inherit(Thread& thread, const Thread* heir) noexcept {
 bool can_run(const Thread& thread) noexcept { return thread.ready_ns <= all().now_ns; }
 
 void await_baton(Thread& thread) noexcept {
-  while (sem_wait(&thread.baton) != 0) {
-  }
+  // Not a semaphore: ThreadSanitizer would take the baton for synchronization of the threads under test.
+  while (thread.baton.exchange(0, std::memory_order_acquire) == 0)
+    syscall(SYS_futex, &thread.baton, FUTEX_WAIT_PRIVATE, 0, nullptr);
   Scheduler& s = all();
   if (s.ending == nullptr) return;
   pthread_join(s.ending->handle, nullptr);  // it does nothing more, at no time
@@ -182,7 +194,8 @@ void pass_baton(Thread& to) noexcept {
   Scheduler& s = all();
   s.running = &to;
   ++s.outcome.switches;
-  sem_post(&to.baton);
+  to.baton.store(1, std::memory_order_release);
+  syscall(SYS_futex, &to.baton, FUTEX_WAKE_PRIVATE, 1);
 }
 
 std::string describe(const Thread& thread) {
@@ -294,8 +307,9 @@ void check_limits() noexcept {
 /// A call begins, or an atomic operation that may be a switch: the time that passed is paid.
 void enter(Thread& thread, Call call) noexcept {
   Scheduler& s = all();
-  const time_ns_t cost_ns = static_cast<time_ns_t>(s.atomics_paid - atomics_left) * kOfAnAtomicStep;
-  s.atomics_paid = atomics_left;
+  const std::uint64_t left = atomics_left.load(std::memory_order_relaxed);
+  const time_ns_t cost_ns = static_cast<time_ns_t>(s.atomics_paid - left) * kOfAnAtomicStep;
+  s.atomics_paid = left;
   s.now_ns += cost_ns;
   thread.cpu_ns += cost_ns;
   thread.call = call;
@@ -326,12 +340,13 @@ struct AtTheEnd {
   explicit AtTheEnd(Thread& of) : thread(&of) {}
   ~AtTheEnd() {
     step(Call::thread_end);
+    released(thread);
     thread->has_ended = true;
     std::erase(all().alive, thread);
     wake_all(thread);
     this_thread = nullptr;
     Thread& next = choose();
-    all().ending = thread;
+    if (kIsJoined) all().ending = thread;
     pass_baton(next);
   }
   AtTheEnd(const AtTheEnd&) = delete;
@@ -423,7 +438,6 @@ Thread& self() noexcept {
   auto* const main = new Thread;
   std::strcpy(main->name.data(), "main");
   main->handle = pthread_self();
-  sem_init(&main->baton, 0, 0);
   s.threads.reserve(kMostThreads);
   s.alive.reserve(kMostThreads);
   s.threads.push_back(main);
@@ -496,9 +510,9 @@ Thread* start(const NewThread& made, int& error) {
   thread->priority = made.priority;
   thread->entry = made.entry;
   thread->argument = made.argument;
-  sem_init(&thread->baton, 0, 0);
   pthread_attr_t attributes;
   pthread_attr_init(&attributes);
+  if (!kIsJoined) pthread_attr_setdetachstate(&attributes, PTHREAD_CREATE_DETACHED);
   if (made.stack_bytes != 0) pthread_attr_setstacksize(&attributes, made.stack_bytes);
   error = pthread_create(&thread->handle, &attributes, &run, thread);
   pthread_attr_destroy(&attributes);
@@ -514,6 +528,7 @@ Thread* start(const NewThread& made, int& error) {
 void join(Thread& thread) noexcept {
   step(Call::thread_join);
   while (!thread.has_ended) block(Call::thread_join, &thread, kForever, false);
+  acquired(&thread);
 }
 
 pthread_t handle(const Thread& thread) noexcept { return thread.handle; }
@@ -523,6 +538,7 @@ bool Lock::take() noexcept {
   if (holder_ == nullptr || (is_recursive_ && holder_ == &self())) {
     holder_ = &self();
     ++depth_;
+    acquired(this);
     return true;
   }
   return false;
@@ -549,6 +565,7 @@ bool Lock::lock_until(time_ns_t until_ns) noexcept {
 void Lock::release() noexcept {
   if (holder_ != &self()) fail("a thread unlocks a lock that it does not hold");
   if (--depth_ > 0) return;
+  released(this);
   holder_ = nullptr;
   if (inherits_) {
     for (Thread* thread : all().alive) {
@@ -564,6 +581,47 @@ void Lock::unlock() noexcept {
 }
 
 bool Lock::is_held_here() const noexcept { return holder_ == &self(); }
+
+void SharedLock::lock() noexcept {
+  step(Call::lock);
+  while (is_written_ || readers_ != 0) block(Call::lock, this, kForever, false);
+  take();
+}
+bool SharedLock::try_lock() noexcept {
+  step(Call::try_lock);
+  if (is_written_ || readers_ != 0) return false;
+  take();
+  return true;
+}
+void SharedLock::take() noexcept {
+  is_written_ = true;
+  acquired(this);
+  acquired(&readers_);
+}
+void SharedLock::unlock() noexcept {
+  released(this);
+  is_written_ = false;
+  wake_all(this);
+  step(Call::unlock);
+}
+void SharedLock::lock_shared() noexcept {
+  step(Call::lock_shared);
+  while (is_written_) block(Call::lock_shared, this, kForever, false);
+  ++readers_;
+  acquired(this);
+}
+bool SharedLock::try_lock_shared() noexcept {
+  step(Call::try_lock);
+  if (is_written_) return false;
+  ++readers_;
+  acquired(this);
+  return true;
+}
+void SharedLock::unlock_shared() noexcept {
+  released(&readers_);
+  if (--readers_ == 0) wake_all(this);
+  step(Call::unlock);
+}
 
 void fail(const std::string& what) noexcept {
   Scheduler& s = all();
@@ -603,6 +661,7 @@ bool futex_lock_pi(Atomic<std::uint32_t>& word) noexcept {
   const std::uint32_t found = word.system().load();
   if ((found & kFutexHolder) == 0) {
     word.system().store(self.id);
+    seeds::acquired(&word);
     return true;
   }
   const seeds::Thread* holder = nullptr;
@@ -615,6 +674,7 @@ bool futex_lock_pi(Atomic<std::uint32_t>& word) noexcept {
   seeds::let_inherit(self, holder);
   while (!self.is_granted) seeds::block(Call::futex_lock, &word, kForever, false);
   seeds::let_inherit(self, nullptr);
+  seeds::acquired(&word);
   return true;
 }
 
@@ -623,6 +683,7 @@ bool futex_unlock_pi(Atomic<std::uint32_t>& word) noexcept {
   seeds::step(Call::futex_unlock);
   const seeds::Thread& self = seeds::self();
   if ((word.system().load() & kFutexHolder) != self.id) return false;
+  seeds::released(&word);
   seeds::Thread* next = nullptr;
   std::uint32_t waiting = 0;
   for (seeds::Thread* thread : seeds::all().alive) {

@@ -4,7 +4,10 @@
 
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/clocks.hpp"
+#include "mauve_rt/base/seam/guards.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/seam/ordinary_thread.hpp"
+#include "mauve_rt/base/seam/shared_mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "forked_run.hpp"
@@ -96,6 +99,46 @@ TEST(AtomicsOfTheSeededScheduler, SwitchAtTheSameOnesAgain) {
     EXPECT_EQ(one.text, other.text) << "seed " << seed;
   }
 }
+
+#if defined(MAUVE_SEES_RACES)
+/// One thread hands a value to another one, by an atomic with that order.
+template <std::memory_order Order>
+void hand_over(std::uint64_t /*seed*/, Findings& findings) {
+  Atomic<bool> is_there{false};
+  int value = 0;
+  OrdinaryThread giver([&] {
+    value = 1;
+    is_there.store(true, Order);
+  });
+  while (!is_there.load(std::memory_order_acquire)) {
+  }
+  findings.expect(value == 1, "the value is not there");
+  giver.join();
+}
+
+template <typename Lock>
+void hand_over_under_lock(std::uint64_t /*seed*/, Findings& findings) {
+  Lock lock;
+  int value = 0;
+  const auto add = [&] {
+    const LockGuard guard(lock);
+    ++value;
+  };
+  OrdinaryThread other(add);
+  add();
+  other.join();
+  findings.expect(value == 2, "lost an update");
+}
+
+TEST(RacesUnderTheSeededScheduler, AreSeenAsTheMemoryOrdersSay) {
+  EXPECT_EQ(20, failures(hand_over<std::memory_order_relaxed>, 20));
+  EXPECT_EQ(0, failures(hand_over<std::memory_order_release>, 20));
+}
+TEST(RacesUnderTheSeededScheduler, AreNoneUnderALock) {
+  EXPECT_EQ(0, failures(hand_over_under_lock<Mutex>, 20));
+  EXPECT_EQ(0, failures(hand_over_under_lock<SharedMutex>, 20));
+}
+#endif
 
 TEST(ComputingUnderTheSeededScheduler, TakesTimeOfTheProcessor) { EXPECT_EQ(0, failures(compute_alone, 20)); }
 

@@ -140,8 +140,8 @@ struct Participant {
 /// | to_vote_        | each participant once, when it has raised the cut | same | acq_rel: the last one sees all raises    |
 /// | to_pass_ (futex)| each participant once: its last touch   | requester   | acq_rel: all that they wrote                |
 /// | decided_ (futex)| who decides the cut                     | requester   | release/acquire; a hint, cut_ says it       |
-/// | is_refused_     | the first participant that refuses      | same        | acq_rel: one of them writes the refusal     |
-/// | refusal_ ...    | that one, before it calls off           | requester   | the task's slot                             |
+/// | refusal_state_  | the first participant that refuses      | requester   | release/acquire: the refusal is complete    |
+/// | refusal_, refused_by_, adopt_was_late_ | that one, in state writing | requester, if complete | refusal_state_ |
 /// | answered_       | requester                               | participants| relaxed: a hint                             |
 /// | off_, off_by_   | who calls it off first                  | requester   | relaxed before the cut's exchange           |
 /// | the rest        | requester, before it posts              | participants| the task's slot                             |
@@ -226,8 +226,8 @@ class Commit {
   bool is_left() const noexcept;
   /// Whether a component was given up whose adopt did not end. [non-rt], after it ended.
   bool has_given_up() const noexcept { return given_up_ != nullptr; }
-  /// The action whose adopt refused, or nullptr. [non-rt], after it ended.
-  const CommitAction* refused_by() const noexcept { return refused_by_; }
+  /// The action whose adopt had refused when the requester went on, or nullptr. [non-rt], after it ended.
+  const CommitAction* refused_by() const noexcept { return is_refused_ ? refused_by_ : nullptr; }
   /// Why it was called off. [non-rt], after it ended.
   Off off() const noexcept;
 
@@ -294,7 +294,9 @@ class Commit {
   bool adopt_was_late_{false};
   std::exception_ptr refusal_{};
   const CommitAction* refused_by_{nullptr};
-  Atomic<bool> is_refused_{false};
+  enum class RefusalState : std::uint8_t { none, writing, complete };
+  Atomic<RefusalState> refusal_state_{RefusalState::none};
+  bool is_refused_{false};  // as the requester found it: a late adopt may refuse afterwards
   Atomic<bool> answered_{false};
   Atomic<Off> off_{Off::not_yet};
   Atomic<const Task*> off_by_{nullptr};

@@ -131,6 +131,27 @@ class Lock {
   bool inherits_;
 };
 
+/// As std::shared_mutex.
+class SharedLock {
+ public:
+  SharedLock() = default;
+  SharedLock(const SharedLock&) = delete;
+  SharedLock& operator=(const SharedLock&) = delete;
+
+  void lock() noexcept;
+  bool try_lock() noexcept;
+  void unlock() noexcept;
+  void lock_shared() noexcept;
+  bool try_lock_shared() noexcept;
+  void unlock_shared() noexcept;
+
+ private:
+  void take() noexcept;
+
+  bool is_written_{false};
+  int readers_{0};
+};
+
 /// Ends the process with the seed, and with what each thread waits for.
 [[noreturn]] void fail(const std::string& what) noexcept;
 
