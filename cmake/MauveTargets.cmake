@@ -82,14 +82,15 @@ macro(mauve_add_part folder)
   endif()
 endmacro()
 
-# mauve_add_programs(PATTERN <glob> LIBRARIES <targets>... [PRECOMPILED <header>] [TESTS [IN_UNITS] [ALONE <names>...]]):
+# mauve_add_programs(PATTERNS <globs>... LIBRARIES <targets>... [PRECOMPILED <header>] [TESTS [IN_UNITS] [ALONE <names>...]]):
 # one executable per source, named as the file.
 # PRECOMPILED: what all of them include is compiled once, which saves half the time they take.
 # TESTS registers every GoogleTest case with ctest; cases are listed when ctest runs, not while building.
 # IN_UNITS: with MAUVE_UNITS, the sources of a folder are one program, tests_<folder>, except those ALONE.
 function(mauve_add_programs)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "TESTS;IN_UNITS" "PATTERN;PRECOMPILED" "LIBRARIES;ALONE")
-  file(GLOB sources CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/${arg_PATTERN}")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "TESTS;IN_UNITS" "PRECOMPILED" "PATTERNS;LIBRARIES;ALONE")
+  list(TRANSFORM arg_PATTERNS PREPEND "${CMAKE_CURRENT_SOURCE_DIR}/")
+  file(GLOB sources CONFIGURE_DEPENDS ${arg_PATTERNS})
   set(programs "")
   foreach(source IN LISTS sources)
     get_filename_component(name "${source}" NAME_WE)

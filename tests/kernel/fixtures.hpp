@@ -12,6 +12,7 @@
 #include <thread>
 #include <vector>
 
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/mauve_rt.hpp"
 
 namespace mauve::testing {
@@ -70,7 +71,7 @@ void wait_until(Condition&& condition, const char* what) {
   const time_ns_t until = monotonic_now_ns() + s_to_ns(60);
   while (!condition()) {
     ASSERT_LT(monotonic_now_ns(), until) << "gave up waiting for: " << what;
-    std::this_thread::sleep_for(std::chrono::microseconds(200));
+    sleep_for(us_to_ns(200));
   }
 }
 
@@ -79,7 +80,7 @@ void wait_until(Condition&& condition, const char* what) {
 class Backoff {
  public:
   void operator()() {
-    if (++turns_ > kSpins) std::this_thread::sleep_for(std::chrono::microseconds(20));
+    if (++turns_ > kSpins) sleep_for(us_to_ns(20));
   }
 
  private:
@@ -130,7 +131,7 @@ struct ComponentsEndFirst {
 /// own variables, which are gone by now.
 inline void run_on_where_sanitized() {
 #ifdef __SANITIZE_ADDRESS__
-  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  sleep_for(ms_to_ns(30));
 #endif
 }
 

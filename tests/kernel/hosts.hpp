@@ -19,7 +19,7 @@ class OnThreads {
   /// Until every component that runs has been released at all instants up to then.
   void run_for(time_ns_t duration_ns) {
     const time_ns_t until = monotonic_now_ns() + duration_ns;
-    std::this_thread::sleep_for(std::chrono::nanoseconds(duration_ns));
+    sleep_for(duration_ns);
     for (const auto& component : architecture_.components()) {
       const Task& task = component->task();
       const auto is_done = [&] {

@@ -2,6 +2,8 @@
 // A change that is made and that one component is late to take.
 #pragma once
 
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
+
 #include "hosts.hpp"
 
 namespace mauve::testing::open_change {
@@ -71,7 +73,7 @@ class OpenChange : public Hosted<Way> {
     if (is_virtual) {
       request();
     } else {
-      requester = std::thread([request] { EXPECT_NO_THROW(request()); });
+      requester = OrdinaryThread([request] { EXPECT_NO_THROW(request()); });
       wait_until([&] { return agree->entered.load(); }, "the adopt of b");
       const int runs = this->core(*late).runs;
       wait_until([&] { return this->core(*late).runs > runs + 5; }, "the late one to vote");
@@ -86,7 +88,7 @@ class OpenChange : public Hosted<Way> {
   /// Some periods; the late one does not count.
   void pass_time() {
     if constexpr (is_virtual) this->run_for(ms_to_ns(6));
-    if constexpr (!is_virtual) std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    if constexpr (!is_virtual) sleep_for(ms_to_ns(20));
   }
   void let_it_go_on() { held->doors.open = true; }
   bool has_taken() { return late->template shell_as<TestShell>().gain.value() == 2.0; }
@@ -126,7 +128,7 @@ class OpenChange : public Hosted<Way> {
   std::function<void()> after_doors = [] {};
   Component* late{nullptr};
   TransactionReport first;
-  std::thread requester;
+  OrdinaryThread requester;
 };
 
 class OpenChangeBeside : public OpenChange<OnThreads> {};

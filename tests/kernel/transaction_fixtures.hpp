@@ -44,7 +44,7 @@ struct Doors {
   std::atomic<bool> open{false};
   void pass() {
     entered = true;
-    while (!open) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    while (!open) sleep_for(ms_to_ns(1));
   }
 };
 struct HangingCore : TestCore {

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What is cleaned up beside changes, lane by lane.
+#include "mauve_rt/base/seam/mutex.hpp"
+
 #include "fixtures.hpp"
 
 namespace mauve::testing::test_keeper {
@@ -13,7 +15,7 @@ class KeeperLanes : public ::testing::Test {
     keeper.take(
         what,
         [this, what] {
-          const std::lock_guard lock(mutex);
+          const LockGuard lock(mutex);
           done.push_back(what);
         },
         lane, place);
@@ -22,13 +24,13 @@ class KeeperLanes : public ::testing::Test {
     wait_until([&] { return all_done().size() == count; }, "the work");
   }
   std::vector<std::string> all_done() {
-    const std::lock_guard lock(mutex);
+    const LockGuard lock(mutex);
     return done;
   }
 
   const int one{0};
   const int other{0};
-  std::mutex mutex;
+  Mutex mutex;
   std::vector<std::string> done;
   Keeper keeper;  // last: its threads use the rest
 };

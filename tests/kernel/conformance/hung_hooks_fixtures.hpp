@@ -3,8 +3,11 @@
 #pragma once
 
 #include <array>
-#include <condition_variable>
-#include <future>
+#include <utility>
+
+#include "mauve_rt/base/seam/condition_variable.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/base/seam/ordinary_thread.hpp"
 
 #include "hosts.hpp"
 
@@ -147,7 +150,7 @@ class Watch {
   explicit Watch(Doors& doors) : thread_([this, &doors] { run(doors); }) {}
   ~Watch() {
     {
-      const std::lock_guard lock(mutex_);
+      const LockGuard lock(mutex_);
       is_over_ = true;
     }
     changed_.notify_all();
@@ -158,14 +161,50 @@ class Watch {
 
  private:
   void run(Doors& doors) {
-    std::unique_lock lock(mutex_);
-    if (!changed_.wait_for(lock, std::chrono::seconds(30), [this] { return is_over_; })) doors.open = true;
+    const time_ns_t until_ns = monotonic_now_ns() + s_to_ns(30);
+    const LockGuard lock(mutex_);
+    while (!is_over_ && changed_.wait_until(mutex_, until_ns)) {
+    }
+    if (!is_over_) doors.open = true;
   }
 
-  std::mutex mutex_;
-  std::condition_variable changed_;
+  Mutex mutex_;
+  ConditionVariable changed_;
   bool is_over_{false};
-  std::thread thread_;
+  OrdinaryThread thread_;
+};
+
+/// The answer of a request, which another thread makes where time does not stand still.
+class Answer {
+ public:
+  Answer() = default;
+  ~Answer() { wait(); }
+  Answer(const Answer&) = delete;
+  Answer& operator=(const Answer&) = delete;
+
+  template <typename Request>
+  void ask(Request request, bool here) {
+    is_asked_ = true;
+    if (here) {
+      code_ = request();
+    } else {
+      thread_ = OrdinaryThread([this, request = std::move(request)]() mutable { code_ = request(); });
+    }
+  }
+  bool is_asked() const { return is_asked_; }
+  void wait() {
+    if (thread_.joinable()) thread_.join();
+  }
+  ErrorCode take() {
+    wait();
+    is_asked_ = false;
+    return code_;
+  }
+
+ private:
+  bool is_asked_{false};
+  ErrorCode code_{};
+  OrdinaryThread thread_;
 };
 
 inline constexpr time_ns_t kLong = s_to_ns(60);
@@ -223,7 +262,7 @@ class HookCase : public Hosted<Way>, public ::testing::WithParamInterface<Hook> 
       doors->open = true;
     }
     for (const auto& each : {trap, trial_trap, fallback_trap}) each->armed = Point::none;
-    if (change.valid()) change.wait();
+    change.wait();
     this->way.shutdown();
   }
 
@@ -353,9 +392,7 @@ class HookCase : public Hosted<Way>, public ::testing::WithParamInterface<Hook> 
       }
       return ErrorCode::internal;  // none
     };
-    change = std::async(is_virtual ? std::launch::deferred : std::launch::async,
-                        [answer, asked = std::move(transaction)]() mutable { return answer(asked); });
-    if (is_virtual) change.wait();
+    change.ask([answer, asked = std::move(transaction)]() mutable { return answer(asked); }, is_virtual);
   }
 
   const std::shared_ptr<Doors> doors{std::make_shared<Doors>()};
@@ -365,7 +402,7 @@ class HookCase : public Hosted<Way>, public ::testing::WithParamInterface<Hook> 
       std::make_shared<Trap>(is_virtual, doors)};  // of a core that comes later
   const std::shared_ptr<Trap> fallback_trap{
       std::make_shared<Trap>(is_virtual, doors)};  // of the fallback core
-  std::future<ErrorCode> change;
+  Answer change;
 };
 
 }  // namespace mauve::testing::hung_hooks

@@ -68,7 +68,7 @@ TEST_P(HungHook, AStopByForceMakesTheOutputsSafe) {
   EXPECT_EQ(0.0, value_of("b"));
   EXPECT_EQ(7.0, value_of("p"));
   if (hook() == Hook::adopt) {
-    EXPECT_EQ(ErrorCode::wrong_revision, change.get()) << "its change is answered";
+    EXPECT_EQ(ErrorCode::wrong_revision, change.take()) << "its change is answered";
   }
 }
 
@@ -160,7 +160,7 @@ TEST_P(HungHook, AStructuralChangeOfOthersIsMade) {
 
 TEST_P(HungHook, TheListSaysWhatLasts) {
   misbehave();
-  const bool hangs_in_state = is_occupied() && !change.valid();
+  const bool hangs_in_state = is_occupied() && !change.is_asked();
   if (hangs_in_state) request_property();
   const auto phase = [&] {
     const auto open = host().open_changes();
@@ -186,7 +186,7 @@ TEST_P(HungHook, TheListSaysWhatLasts) {
   EXPECT_THAT(host().probations(), SizeIs(hook() == Hook::probation ? 1 : 0));
   if (hangs_in_state) {
     EXPECT_EQ(Abandoned::called_off, host().abandon("b"));
-    EXPECT_EQ(ErrorCode::wrong_revision, change.get());
+    EXPECT_EQ(ErrorCode::wrong_revision, change.take());
   }
 }
 
@@ -213,8 +213,8 @@ TEST_P(FailedHook, IsReportedAsItIs) {
                              : hook() == Hook::adopt           ? ErrorCode::adopt_refused
                              : hook() == Hook::promote         ? ErrorCode::not_running
                                                                : ErrorCode::internal;
-  if (change.valid()) {
-    EXPECT_EQ(expected, change.get());
+  if (change.is_asked()) {
+    EXPECT_EQ(expected, change.take());
   }
   if (hook() == Hook::probation) {
     EXPECT_EQ(ProbationVerdict::reverted, host().probations().front().verdict);

@@ -211,8 +211,7 @@ TEST_F(Rule6StopStart, AStopThatTimesOutNamesTheStateAndStaysPending) {
   Component& component = add("c", 5);
   std::atomic<bool> go_on{false};
   core(component).work = [&] {
-    while (!go_on) {
-    }
+    while (!go_on) yield_thread();
   };
   deploy();
   wait_runs(component, 1);
@@ -232,8 +231,7 @@ TEST_F(Rule6StopStart, WhatAComponentStillUsesIsNotCleanedUp) {
   Component& component = add("c", 5);
   std::atomic<bool> go_on{false};
   core(component).work = [&] {
-    while (!go_on) {
-    }
+    while (!go_on) yield_thread();
   };
   deploy();
   wait_runs(component, 1);

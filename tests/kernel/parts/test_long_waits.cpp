@@ -53,7 +53,7 @@ TEST(LongWaits, TheGridKnowsNoOverflow) {
 }
 
 TEST(LongWaits, AnInstantBeforeTheClockBeganHasPassed) {
-  const std::atomic<std::uint32_t> word{1};
+  const Atomic<std::uint32_t> word{1};
   for (const time_ns_t until : {INT64_MIN, time_ns_t{-1}, time_ns_t{0}})
     EXPECT_FALSE(futex_wait_until(word, 1, until)) << "it would be asked again and again";
 }
@@ -62,7 +62,7 @@ using ShortPatience = Deployed;
 
 TEST_F(ShortPatience, OfLessThanNothingIsRefusedAtOnce) {
   Component& component = add("c", 1000);
-  core(component).work = [] { std::this_thread::sleep_for(std::chrono::milliseconds(300)); };
+  core(component).work = [] { sleep_for(ms_to_ns(300)); };
   deploy();
   wait_runs(component, 1);
   for (const time_ns_t patience : {INT64_MIN, time_ns_t{-1}, time_ns_t{0}}) {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The functions of the seam under the seeded scheduler: clocks, sleeps, the process barrier, threads.
 #include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 
 #include "mauve_rt/base/seam/clocks.hpp"
 #include "mauve_rt/base/seam/process_barrier.hpp"
@@ -55,6 +57,8 @@ int await_signal(const sigset_t& /*signals*/) noexcept {
 }
 
 int Thread::start(const ThreadSettings& settings, void* (*entry)(void*), void* argument) {
+  const long processors = sysconf(_SC_NPROCESSORS_CONF);
+  if (std::ranges::any_of(settings.cpus, [&](int cpu) { return cpu >= processors; })) return EINVAL;
   int error = 0;
   cpus_ = settings.cpus.empty() ? std::vector{0} : settings.cpus;
   thread_ = seeds::start({.name = settings.name.c_str(),
