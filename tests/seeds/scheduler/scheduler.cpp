@@ -452,6 +452,12 @@ void switch_at_atomic() noexcept {
   reschedule();
 }
 
+void switch_often() noexcept {
+  Scheduler& s = all();
+  s.weather.atomic_once_in = std::array<std::uint64_t, 4>{3, 6, 15, 40}[s.random.below(4)];
+  begin_countdown();
+}
+
 void step(Call call) noexcept { step(self(), call, all().weather.cost_ns); }
 
 void compute(time_ns_t length_ns) noexcept {

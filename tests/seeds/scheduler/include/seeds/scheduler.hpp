@@ -74,6 +74,8 @@ const char* running() noexcept;
 /// One line a call: instant, thread, call.
 void write_trace(const std::string& path);
 
+/// In this run threads switch at many atomic operations: for a scenario of few milliseconds.
+void switch_often() noexcept;
 /// The calling thread uses the processor for so long: for a scenario, which would loop over many readings of a clock otherwise.
 void compute(time_ns_t length_ns) noexcept;
 
