@@ -145,12 +145,11 @@ def test_unregistered_messages_travel_between_components_in_python(built: Stage)
     deployer = built.deploy()
     hear = built.architecture.component("hear").core
     built.until(lambda: len(hear.samples) >= 20)
-    heard = [int(sample.value.pose.position.x) for sample in hear.samples]
+    samples = list(hear.samples)  # the component goes on
+    heard = [int(sample.value.pose.position.x) for sample in samples]
     assert heard == sorted(heard)
-    assert all(
-        sample.value.header.frame_id == f"count {n}" for sample, n in zip(hear.samples, heard, strict=True)
-    )
-    assert all((sample.time_ns - deployer.epoch_ns) % (2 * MS) == 0 for sample in hear.samples)
+    assert all(sample.value.header.frame_id == f"count {n}" for sample, n in zip(samples, heard, strict=True))
+    assert all((sample.time_ns - deployer.epoch_ns) % (2 * MS) == 0 for sample in samples)
     deployer.stop("count")
     count = len(hear.samples)
     built.until(lambda: hear.samples[-1].value.header.frame_id == "")
