@@ -16,6 +16,9 @@
 #include <string>
 #include <vector>
 
+#include "mauve_rt/base/seam/sleep.hpp"
+#include "mauve_rt/base/time.hpp"
+
 #include "seeds/scheduler.hpp"
 
 namespace mauve::seeds {
@@ -55,6 +58,14 @@ class Findings {
   std::vector<std::string> notes_;
   std::map<std::string, int> counts_;
 };
+
+/// Of a scenario that is over: all threads but its own end within that time.
+inline void expect_threads_end(Findings& findings, time_ns_t within_ns) {
+  constexpr time_ns_t kBetween = ms_to_ns(1);
+  for (time_ns_t waited_ns = 0; waited_ns < within_ns && outcome().alive > 1; waited_ns += kBetween)
+    sleep_for(kBetween);
+  findings.expect(outcome().alive == 1, "threads are left:\n" + alive());
+}
 
 struct Run {
   int status{0};  // of the child, as waitpid() has it

@@ -126,8 +126,7 @@ class RandomCommands {
       if (!is_shut_down_) shut_down();
     }
     expect(shared_->cores == 0, std::to_string(shared_->cores) + " cores are not cleaned up");
-    for (int tries = 0; tries < 100 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
-    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+    seeds::expect_threads_end(findings_, ms_to_ns(100));
   }
 
  private:
@@ -140,10 +139,10 @@ class RandomCommands {
   void declare(Architecture& architecture) {
     architecture.add_resource<LatestValue<Number>>("out");
     architecture.add_resource<SharedData<Number>>("written");
-    is_sporadic_ = dice_.once_in(2);
+    const bool is_sporadic = dice_.once_in(2);
     for (std::size_t i = 0; i < 2; ++i) {
       std::unique_ptr<FsmBase> fsm =
-          i == 1 && is_sporadic_ ? new_part<FsmBase, CommandEventFsm>() : new_part<FsmBase, CommandFsm>();
+          i == 1 && is_sporadic ? new_part<FsmBase, CommandEventFsm>() : new_part<FsmBase, CommandFsm>();
       Component& component =
           architecture.add_component(name(i), new_part<Shell, TestShell>(), core(i), std::move(fsm),
                                      {.priority = 20 + 10 * dice_.below(2)});
@@ -318,8 +317,7 @@ class RandomCommands {
   Deployer* deployer_{nullptr};
   int last_core_{0};
   std::array<int, 2> commands_{};  // begun and ended
-  bool is_sporadic_{false};
-  bool is_shut_down_{false};  // or about to be
+  bool is_shut_down_{false};       // or about to be
 };
 
 inline void random_commands(std::uint64_t seed, seeds::Findings& findings) {

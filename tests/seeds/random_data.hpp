@@ -54,8 +54,7 @@ class RandomData {
       outside.drain();
       check();
     }
-    for (int tries = 0; tries < 1000 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
-    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+    seeds::expect_threads_end(findings_, s_to_ns(1));
   }
 
  private:

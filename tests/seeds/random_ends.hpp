@@ -75,8 +75,7 @@ inline void random_ends(std::uint64_t seed, seeds::Findings& findings) {
     deployer.shutdown();
     findings.count("deployments ended");
   }
-  for (int tries = 0; tries < 100 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
-  findings.expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+  seeds::expect_threads_end(findings, ms_to_ns(100));
   for (const auto& [number, core] : shared->cores) findings.expect(false, "is left: " + core);
 }
 

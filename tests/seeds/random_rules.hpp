@@ -40,8 +40,7 @@ class RandomRules {
       for (int loads = 1 + dice_.below(2); loads > 0; --loads) run_rules(loads == 1);
       deployer.shutdown();
     }
-    for (int tries = 0; tries < 1000 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
-    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+    seeds::expect_threads_end(findings_, s_to_ns(1));
   }
 
  private:

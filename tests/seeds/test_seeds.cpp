@@ -40,8 +40,7 @@ void deploy_two(std::uint64_t /*seed*/, Findings& findings) {
       findings.expect(runs >= 2, std::string(name) + " ran " + std::to_string(runs) + " times");
     }
   }
-  sleep_for(ms_to_ns(1));
-  findings.expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+  seeds::expect_threads_end(findings, ms_to_ns(1));
 }
 
 /// Two threads lock two mutexes, each in its own order.
@@ -97,7 +96,8 @@ void run_twice(const Scenario& scenario, std::uint64_t seed) {
 template <typename Scenario>
 void run_twice(const Scenario& scenario) {
   const std::uint64_t first = asked("MAUVE_SEED", 1);
-  const std::uint64_t end = first + asked("MAUVE_TWICE", 20);
+  const std::uint64_t end =
+      first + asked("MAUVE_TWICE", std::min<std::uint64_t>(20, asked("MAUVE_SEEDS", 20)));
   for (std::uint64_t seed = first; seed < end; ++seed) run_twice(scenario, seed);
 }
 

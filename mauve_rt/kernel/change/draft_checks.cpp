@@ -171,8 +171,11 @@ void Draft::check_port_counts() const {
       count.component = component.name();
     }
   }
-  std::erase_if(counts, [](const auto& count) { return count.second.step == 0 && count.second.fresh == 0; });
-  if (counts.empty()) return;
+  std::erase_if(services, [&](ServiceBase* service) {
+    const Count& count = counts.at(service);
+    return count.step == 0 && count.fresh == 0;
+  });
+  if (services.empty()) return;
   const auto count_all = [&](const Wires& wires) {
     for (const auto& [port, wire] : wires) {
       if (const auto count = counts.find(wire.service); count != counts.end()) ++count->second.ports;
@@ -183,9 +186,7 @@ void Draft::check_port_counts() const {
     if (!by_name_.contains(component->name()) && !is_removed(component->name())) count_all(*wires);
   }
   for (ServiceBase* const service : services) {
-    const auto found = counts.find(service);
-    if (found == counts.end()) continue;
-    const Count& count = found->second;
+    const Count& count = counts.at(service);
     try {
       service->check_ports(count.ports + service->inputs());
       // A port that goes, in this change or in one that a late component has yet to take, has its place until then.

@@ -144,8 +144,7 @@ class Checks : protected Scene {
 
   /// No thread and no part is left.
   void settle(bool leaves_nothing) {
-    for (int tries = 0; tries < 1000 && seeds::outcome().alive > 1; ++tries) sleep_for(ms_to_ns(1));
-    expect(seeds::outcome().alive == 1, "threads are left:\n" + seeds::alive());
+    seeds::expect_threads_end(findings_, s_to_ns(1));
     if (!leaves_nothing && !shared_->hung_cores.empty()) return;
     for (const auto& [number, core] : shared_->cores) expect(false, "is left: " + core);
   }

@@ -86,7 +86,7 @@ class Atomic {
   const std::atomic<T>& system() const noexcept { return system_; }
 
  private:
-  /// In a source that ThreadSanitizer does not compile, it is told what the operation promises.
+  /// In a source that ThreadSanitizer does not compile, the seam reports to it what the operation promises.
   class Operation {
    public:
     Operation(const Atomic* atomic, std::memory_order order) noexcept : atomic_(atomic), order_(order) {
