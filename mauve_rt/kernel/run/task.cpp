@@ -272,10 +272,15 @@ void Task::require_startable() const {
                  .expected = "a core that configure_core() has bound and configured",
                  .remedy = "call configure_core() first"});
   }
-  if (!has_thread_ && !simulated_) {
+  if (!can_take_up_start()) {
     throw Error(ErrorCode::not_configured, "the component has no thread",
                 {.component = name_, .remedy = "deploy the architecture first"});
   }
+}
+
+/// A thread that has its order to end takes up none.
+bool Task::can_take_up_start() const noexcept {
+  return simulated_ || (has_thread() && (control_.load(std::memory_order_acquire) & kExit) == 0);
 }
 
 /// Takes the grid that counts from there, or the deployment's, and returns its next instant. It keeps that grid, with
@@ -305,7 +310,9 @@ void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
   throw Error(ErrorCode::timeout, what,
               {.component = name_,
                .element = "state " + current_state(),
-               .expected = "the end of the state within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
+               .expected = timeout_ns == 0 ? "a state that has ended"
+                                           : "the end of the state within " +
+                                                 std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
                .found = "still running",
                .remedy = remedy});
 }
@@ -339,9 +346,14 @@ bool Task::withdraw_start() noexcept {
   const LockGuard lock(order_mutex_);
   if (state() != ComponentState::stopped) return false;
   if ((control_.fetch_and(~kStart, std::memory_order_acq_rel) & kStart) == 0) return false;
-  started_.store(1, std::memory_order_release);  // who waits for it waits in vain
-  futex_wake_all(started_);
+  end_wait_for_start();
   return true;
+}
+
+/// Whoever waits goes on, whether the component has started or not.
+void Task::end_wait_for_start() noexcept {
+  started_.store(1, std::memory_order_release);
+  futex_wake_all(started_);
 }
 
 bool Task::stop(time_ns_t timeout_ns, bool force) {

@@ -368,11 +368,10 @@ void Task::take_parked(Participant& participant) noexcept {
   note_taken(commit);
   join_new_epoch(participant);
   // A shutdown may have come before the commit held the task.
-  const bool can_start = simulated_ || has_thread();
-  if (can_start && participant.afterwards == Afterwards::restart) {
+  if (can_take_up_start() && participant.afterwards == Afterwards::restart) {
     post_start(start_on(participant.start_clock_ns));
   } else {
-    started_.store(1, std::memory_order_relaxed);  // relaxed: nobody but its requester waits for it
+    end_wait_for_start();
   }
   participant.armed_ns = clock().now_ns();
   commit.pass(participant);

@@ -72,8 +72,7 @@ void Task::take_up_start() {
   if (!simulated_) counters_.mark();
   regain_priority();
   start_machine(start_at_ns_);
-  started_.store(1, std::memory_order_release);
-  futex_wake_all(started_);
+  end_wait_for_start();
 }
 
 void Task::start_machine(time_ns_t instant_ns) noexcept {

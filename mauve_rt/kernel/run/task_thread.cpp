@@ -109,6 +109,7 @@ void Task::thread_main() noexcept {
   ended_.store(1, std::memory_order_seq_cst);
   settle_slot(true);
   release_withdrawn();
+  end_wait_for_start();  // one that a change posted and this thread has not taken up
   futex_wake_all(ended_);
 }
 

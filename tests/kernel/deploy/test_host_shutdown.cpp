@@ -84,6 +84,19 @@ TEST_F(HostShutdown, WaitsForNobodysPreparation) {
   deployer.shutdown();
 }
 
+TEST_F(HostShutdown, AThreadThatHasTheOrderToEndIsGivenNoStart) {
+  Task& task = add("component").task();
+  deploy();
+  deployer.stop("component");
+  task.end_thread(0);  // as a shutdown gives the order to all before it waits for one
+  try {
+    task.start({}, s_to_ns(60));
+    ADD_FAILURE() << "it was posted";
+  } catch (const Error& error) {
+    EXPECT_EQ(ErrorCode::not_configured, error.code()) << error.what();
+  }
+}
+
 TEST_F(HostShutdown, WaitsForNoAdoptOfAStoppedComponent) {
   Component& drive = add("drive");
   Component& changed = add("changed");

@@ -361,7 +361,9 @@ class Task final : public Waiter {
   time_ns_t next_instant() const noexcept;
   time_ns_t restart_instant(const Participant& participant) noexcept;
   bool withdraw_start() noexcept;
+  void end_wait_for_start() noexcept;
   void require_startable() const;
+  bool can_take_up_start() const noexcept;
   void begin_trace(bool trace);
 
   // the thread
