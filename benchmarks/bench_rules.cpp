@@ -154,8 +154,7 @@ mauve::rules::ActionSteps core(const char* implementation, const char* target = 
 /// The rule at work, and where a component hangs the one about that.
 class Rule {
  public:
-  Rule(mauve::Host& host, const Settings& settings)
-      : runner_(host, std::make_unique<mauve::rules::Engine>(rules(settings)), actions(settings)) {
+  Rule(mauve::Host& host, const Settings& settings) : runner_(host, rules(settings), actions(settings)) {
     runner_.start();
   }
 

@@ -102,7 +102,10 @@ class Corrected:
         return made
 
     def handle_function(self, path: QualifiedName, function: object) -> list[Function]:
-        """A vector takes any sequence. One of strings takes a list: a string would be a sequence, too."""
+        """A vector takes any sequence. One of strings takes a list: a string would be a sequence, too.
+
+        What is None by default may be None: of a pointer pybind11 does not say so.
+        """
         made = super().handle_function(path, function)
         for argument in (each for function in made for each in function.args):
             kind = argument.annotation
@@ -111,6 +114,9 @@ class Corrected:
                 argument.name, argument.annotation = KEYWORDS.get(path[-1], any_)
             elif str(kind).startswith("list[") and str(kind) != "list[str]":
                 kind.name = QualifiedName.from_str("collections.abc.Sequence")
+            is_none = getattr(argument.default, "repr", "") == "None"
+            if is_none and "None" not in str(kind) and "Optional" not in str(kind):
+                argument.annotation = named("typing.Optional", kind)
         return made
 
 

@@ -17,9 +17,9 @@ using Unlocked = py::call_guard<InterpreterUnlocked>;
 class PyRuleRunner {
  public:
   PyRuleRunner(PyHost& host, std::vector<rules::Rule> all, const std::vector<rules::RuleActions>& actions,
-               std::map<std::string, std::string> topics)
-      : runner_(std::make_unique<rules::RuleRunner>(
-            host.host(), std::make_unique<rules::Engine>(std::move(all)), actions, std::move(topics))) {
+               std::map<std::string, std::string> topics, PyRuleRunner* before)
+      : runner_(std::make_unique<rules::RuleRunner>(host.host(), std::move(all), actions, std::move(topics),
+                                                    before != nullptr ? before->runner_.get() : nullptr)) {
     living().insert(this);
   }
   ~PyRuleRunner() {
@@ -105,10 +105,14 @@ void bind_rule_runner(py::module_& module) {
 
 Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) for what cannot be there.)")
       .def(py::init<PyHost&, std::vector<rules::Rule>, const std::vector<rules::RuleActions>&,
-                    std::map<std::string, std::string>>(),
+                    std::map<std::string, std::string>, PyRuleRunner*>(),
            py::arg("host"), py::arg("rules"), py::arg("actions"),
-           py::arg("topics") = std::map<std::string, std::string>{}, py::keep_alive<1, 2>(),
-           "`actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it.")
+           py::arg("topics") = std::map<std::string, std::string>{}, py::arg("before") = nullptr,
+           py::keep_alive<1, 2>(),
+           R"(`actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it.
+
+`before`: those of the same host whose place these take, stopped: a rule that is in both, and the same,
+goes on, and what it hears in between counts. It is of no use afterwards, and as it was where this raises.)")
       .def(
           "start", [](PyRuleRunner& self) { self.runner().start(); }, Unlocked(),
           "Begin to watch; the host is deployed.")

@@ -142,7 +142,11 @@ void bind_answers(py::module_& module) {
   py::class_<rules::RuleStatus>(module, "RuleStatus",
                                 "How one rule fares. next: 'do' or 'undo' if nothing changes, and when.")
       .def_readonly("armed", &rules::RuleStatus::armed)
-      .def_readonly("holds", &rules::RuleStatus::holds)
+      .def_property_readonly("holds", &rules::RuleStatus::holds)
+      .def_property_readonly(
+          "known", [](const rules::RuleStatus& self) { return self.truth != rules::Truth::unknown; },
+          "Whether its condition is true or false: until something was received of what it is about, it is "
+          "neither.")
       .def_readonly("in_effect", &rules::RuleStatus::in_effect)
       .def_readonly("changed_by_another", &rules::RuleStatus::changed_by_another)
       .def_readonly("since_ns", &rules::RuleStatus::since_ns)

@@ -7,6 +7,7 @@ from typing import Any
 
 from mauve_rt.cli.arguments import add_executor_and_json
 from mauve_rt.cli.verb import OK
+from mauve_rt.supervision.truth import truth_word
 
 
 def add_list(parser: argparse.ArgumentParser) -> None:
@@ -73,7 +74,7 @@ def _row(rule: Any) -> tuple[str, str, str, str, str]:
     """Armed, the condition, what it has done, what comes next, what is ready for it."""
     if not rule.armed:
         return "no", "-", "what it is about does not run", "-", _prepared(rule)
-    holds = f"{'true' if rule.holds else 'false'} for {rule.since_s:.1f} s"
+    holds = f"{truth_word(rule)} for {rule.since_s:.1f} s"
     stands = "in effect" if rule.in_effect else "watching"
     if rule.changed_by_another:
         stands = "waits: another requester changed what it did"

@@ -14,6 +14,7 @@ from rich.text import Text
 from mauve_rt.cli.list_view import STATES
 from mauve_rt.cli.views import duration
 from mauve_rt.cli.watched import Figures, Followed, WatchedExecutor
+from mauve_rt.supervision.truth import truth_word
 
 SORTED_BY = ("file", "wake-up", "response", "execution", "overruns", "state")
 """What the key `s` goes through; `file`: as the executor lists them."""
@@ -154,7 +155,7 @@ def _components(shown: Sequence[Row], cursor: int | None, of_whom: Callable[[str
 
 def _rules(executor: WatchedExecutor, whose: str) -> Iterator[Text]:
     for rule in executor.rules:
-        stands = "in effect" if rule.in_effect else "true" if rule.holds else "false"
+        stands = "in effect" if rule.in_effect else truth_word(rule)
         coming = f", {rule.next} in {max(rule.next_in_s, 0.0):.1f} s" if rule.next else ""
         words = f"{stands} for {rule.since_s:.0f} s{coming}" if rule.armed else "not armed"
         problem = f"  [bold red]{escape(rule.problem)}[/]" if rule.problem else ""

@@ -20,9 +20,19 @@ class Listen(Protocol):
     """How a topic is heard."""
 
     def __call__(
-        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, latched: bool = False
+        self,
+        topic: str,
+        message: Any,
+        heard: Callable[[Any], None],
+        *,
+        raw: bool,
+        latched: bool = False,
+        kept: bool = False,
     ) -> None:
-        """`message`: its class; `raw`: it need not be read; `latched`: what was said before is heard, too."""
+        """`message`: its class; `raw`: it need not be read.
+
+        `latched`: all writers keep their last message for who comes later. `kept`: some may; it is heard.
+        """
 
 
 class OutsideFeeds:
@@ -82,7 +92,8 @@ class OutsideFeeds:
             leaf = self._types.get((spec.target, spec.detail))
             if leaf is not None:  # else it cannot be heard here, and the rules know that
                 hear = partial(self._hear, number, spec.detail)
-                self._listen(spec.target, heard_type(file, leaf), hear, raw=not spec.detail)
+                is_field = bool(spec.detail)
+                self._listen(spec.target, heard_type(file, leaf), hear, raw=not is_field, kept=is_field)
         elif spec.kind == "peer":
             self._open_peer(executor_name(spec.target), number)
         elif spec.kind == "diagnostic":

@@ -111,6 +111,7 @@ def rule_info(facts: RuleFacts, now_ns: int) -> Any:
         where="executor",
         armed=status.armed,
         holds=status.holds,
+        known=status.known,
         in_effect=status.in_effect,
         changed_by_another=status.changed_by_another,
         ready=facts.ready,

@@ -7,9 +7,9 @@ namespace mauve::rules {
 
 namespace {
 
-constexpr auto kDecided =
-    std::to_array<std::string_view>({"armed", "suppressed", "adopted", "condition_true", "condition_false",
-                                     "do", "undo", "otherwise", "done", "failed", "suppressed"});
+constexpr auto kDecided = std::to_array<std::string_view>(
+    {"armed", "suppressed", "adopted", "condition_true", "condition_false", "condition_unknown", "do", "undo",
+     "otherwise", "done", "failed", "suppressed"});
 constexpr auto kWhy = std::to_array<std::string_view>(
     {"", "it is in effect already", "changed by another requester: left alone until the condition ends",
      "cooldown", "outranked by a rule of higher rank", "the action of another rule is under way",
@@ -21,7 +21,7 @@ constexpr auto kWhy = std::to_array<std::string_view>(
 std::string_view name_of(Decided decided) noexcept { return kDecided[static_cast<std::size_t>(decided)]; }
 std::int64_t trace_code(const Decision& decision) noexcept {
   // Those of the last three are by act.
-  constexpr auto kAlone = std::to_array<std::int64_t>({0, 1, 2, 3, 4, 5, 6, 13});
+  constexpr auto kAlone = std::to_array<std::int64_t>({0, 1, 2, 3, 4, 16, 5, 6, 13});
   constexpr std::array<std::array<std::int64_t, kActs>, 3> kOfAct{{{7, 8, 14}, {9, 10, 15}, {11, 12, 11}}};
   const auto decided = static_cast<std::size_t>(decision.decided);
   return decided < kAlone.size() ? kAlone[decided] : kOfAct[decided - kAlone.size()][index_of(decision.act)];

@@ -34,6 +34,11 @@ Why why_of(Ended how) noexcept {
   return Why::refused;
 }
 
+Decided decided_of(Truth truth) noexcept {
+  if (truth == Truth::unknown) return Decided::condition_unknown;
+  return truth == Truth::yes ? Decided::condition_true : Decided::condition_false;
+}
+
 constexpr Act opposite(Act act) noexcept { return act == Act::do_ ? Act::undo : Act::do_; }
 
 }  // namespace
@@ -41,11 +46,17 @@ constexpr Act opposite(Act act) noexcept { return act == Act::do_ ? Act::undo : 
 /// One rule at work.
 struct Engine::Life {
   std::size_t index{0};
-  std::size_t rank{0};  // 0: the highest
+  std::size_t rank{0};          // 0: the highest
+  std::size_t first_signal{0};  // of heard_; it has so many:
+  std::size_t signals{0};
   Rule rule;
   std::unique_ptr<Condition> condition;
   std::vector<bool> contends;  // with the rule of that number: both are about one component
   Look last{};
+  Truth told{Truth::no};  // what was said of the condition last
+  bool is_due{
+      false};  // `do` is: the condition has held for long enough, and it is not known to be false since
+  bool goes_on{false};  // its condition was armed by the engine before
   bool armed{false};
   bool in_effect{false};
   bool changed_by_another{false};
@@ -65,19 +76,23 @@ struct Engine::Life {
 
   /// When the condition will have been as it is for long enough.
   time_ns_t due_ns() const noexcept {
-    return later_by(last.since_ns, last.holds ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
+    return later_by(last.since_ns, last.holds() ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
   }
+  /// Whether there is something that it could do.
+  bool may_do() const noexcept { return !in_effect && !changed_by_another && !otherwise_begun; }
   /// Whether what is in effect already is its own to undo.
   bool is_undone_by_it() const noexcept { return is_own || rule.takes_over; }
 };
 
-Engine::Engine(std::vector<Rule> rules) {
+Engine::Engine(std::vector<Rule> rules, const Engine* before)
+    : word_(before != nullptr ? before->word_ : std::make_shared<EngineWord>()) {
   for (Rule& rule : rules) {
     auto life = std::make_unique<Life>();
     life->index = lives_.size();
+    life->first_signal = heard_.size();
     const GiveSignal give = [this](const SignalSpec& spec) -> Signal& {
       signals_.push_back(std::make_unique<Signal>(word_));
-      heard_.push_back({.spec = spec, .signal = signals_.back().get()});
+      heard_.push_back({.spec = spec, .signal = signals_.back().get(), .rule = lives_.size()});
       return *signals_.back();
     };
     try {
@@ -87,6 +102,7 @@ Engine::Engine(std::vector<Rule> rules) {
       detail.component = "rule " + rule.name;
       throw Error(failure.code(), failure.statement(), detail);
     }
+    life->signals = heard_.size() - life->first_signal;
     life->rule = std::move(rule);
     lives_.push_back(std::move(life));
   }
@@ -110,9 +126,34 @@ Engine::Engine(std::vector<Rule> rules) {
 
 Engine::~Engine() = default;
 
-void Engine::wake() noexcept {
-  word_.fetch_add(1, std::memory_order_release);
-  futex_wake_all(word_);
+void Engine::wake() noexcept { word_->bump(); }
+
+// ---- one engine after another
+
+std::optional<std::size_t> Engine::find(const Rule& rule) const noexcept {
+  for (const auto& life : lives_) {
+    if (life->rule == rule) return life->index;
+  }
+  return std::nullopt;
+}
+
+void Engine::go_on(std::size_t rule, Engine& before, std::size_t rule_before, bool stays_armed) noexcept {
+  Life& life = *lives_[rule];
+  Life& old = *before.lives_[rule_before];
+  MAUVE_EXPECTS(word_ == before.word_ && life.rule == old.rule);
+  std::swap(life.condition, old.condition);
+  for (std::size_t i = 0; i < life.signals; ++i) {
+    std::swap(signals_[life.first_signal + i], before.signals_[old.first_signal + i]);
+    std::swap(heard_[life.first_signal + i].signal, before.heard_[old.first_signal + i].signal);
+  }
+  life.last = old.last;
+  life.told = old.told;
+  life.is_due = old.is_due;
+  life.in_effect = old.in_effect;
+  life.changed_by_another = old.changed_by_another;
+  life.otherwise_begun = old.otherwise_begun;
+  life.not_before_ns = old.not_before_ns;
+  life.goes_on = stays_armed && old.armed;
 }
 
 // ---- what is found of the architecture
@@ -120,9 +161,13 @@ void Engine::wake() noexcept {
 void Engine::set_present(std::size_t rule, bool present, time_ns_t now_ns) noexcept {
   MAUVE_EXPECTS(rule < lives_.size());
   Life& life = *lives_[rule];
+  const bool goes_on = std::exchange(life.goes_on, false) && present;
   if (life.armed == present) return;
   life.armed = present;
-  life.last = {.since_ns = now_ns};
+  if (goes_on) return tell(life, {.stamp_ns = now_ns, .decided = Decided::armed});
+  life.last = {.truth = Truth::unknown, .since_ns = now_ns};
+  life.told = Truth::no;
+  life.is_due = false;
   life.excused.reset();
   life.waits_since_ns.reset();
   life.otherwise_begun = false;
@@ -204,29 +249,33 @@ time_ns_t Engine::step(time_ns_t now_ns) noexcept {
 }
 
 void Engine::look(Life& life, time_ns_t now_ns) noexcept {
-  const bool before = life.last.holds;
+  const bool held = life.last.holds();
   life.last = life.condition->look(now_ns);
-  if (life.last.holds == before) return;
-  life.failures = 0;
-  life.excused.reset();
-  life.unready_since_ns.reset();
-  life.otherwise_begun = false;
-  tell(life,
-       {.stamp_ns = now_ns, .decided = life.last.holds ? Decided::condition_true : Decided::condition_false});
+  const Truth truth = life.last.truth;
+  if (life.last.holds() != held) {
+    life.failures = 0;
+    life.excused.reset();
+    life.unready_since_ns.reset();
+    life.otherwise_begun = false;
+  }
+  // That nothing is known yet is no news, but where something is in effect.
+  if (truth == life.told || (truth == Truth::unknown && life.told == Truth::no && !life.in_effect)) return;
+  life.told = truth;
+  tell(life, {.stamp_ns = now_ns, .decided = decided_of(truth)});
 }
 
 /// What the dwell times ask for, whether it may be done or not.
 std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
-  const bool is_due = now_ns >= life.due_ns();
-  if (life.last.holds) {
-    if (is_due && !life.in_effect && !life.changed_by_another && !life.otherwise_begun) return Act::do_;
-    return std::nullopt;
+  const bool is_long_enough = now_ns >= life.due_ns();
+  if (life.last.truth == Truth::no) {
+    life.is_due = false;
+    if (!is_long_enough) return std::nullopt;
+    life.changed_by_another = false;
+    if (life.in_effect && !life.rule.undoes) life.in_effect = false;
+    return life.in_effect ? std::optional(Act::undo) : std::nullopt;
   }
-  if (!is_due) return std::nullopt;
-  life.changed_by_another = false;
-  if (life.in_effect && !life.rule.undoes) life.in_effect = false;
-  if (life.in_effect) return Act::undo;
-  return std::nullopt;
+  life.is_due |= life.last.holds() && is_long_enough;
+  return life.is_due && life.may_do() ? std::optional(Act::do_) : std::nullopt;
 }
 
 time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
@@ -234,11 +283,12 @@ time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
   const auto look_at = [&](time_ns_t instant_ns) {
     if (instant_ns > now_ns) next_ns = std::min(next_ns, instant_ns);
   };
-  const bool may_want = life.last.holds ? !life.in_effect && !life.changed_by_another
-                                        : life.in_effect || life.changed_by_another;
+  const bool is_false = life.last.truth == Truth::no;
+  const bool may_want = is_false ? life.in_effect || life.changed_by_another
+                                 : (life.last.holds() || life.is_due) && life.may_do();
   if (!may_want) return next_ns;
   if (life.waits_since_ns) look_at(later_by(*life.waits_since_ns, *life.rule.otherwise_after_ns));
-  if (life.due_ns() > now_ns) {
+  if (!life.is_due && life.due_ns() > now_ns) {
     look_at(life.due_ns());
   } else {
     if (life.unready_since_ns) look_at(later_by(*life.unready_since_ns, kMakingReady));
@@ -462,19 +512,19 @@ std::optional<Decision> Engine::take() noexcept {
 RuleStatus Engine::status(std::size_t rule) const noexcept {
   const Life& life = *lives_[rule];
   RuleStatus status{.armed = life.armed,
-                    .holds = life.last.holds,
+                    .truth = life.last.truth,
                     .in_effect = life.in_effect,
                     .changed_by_another = life.changed_by_another,
                     .since_ns = life.last.since_ns,
                     .measured = life.last.measured};
   if (!life.armed) return status;
-  if (life.last.holds && !life.in_effect && !life.changed_by_another) {
+  if ((life.last.holds() || life.is_due) && !life.in_effect && !life.changed_by_another) {
     status.next = Act::do_;
-    status.next_ns = std::max(life.due_ns(), life.not_before_ns);
-  } else if (!life.last.holds && life.in_effect && life.rule.undoes) {
+    status.next_ns = std::max(life.is_due ? INT64_MIN : life.due_ns(), life.not_before_ns);
+  } else if (life.last.truth == Truth::no && life.in_effect && life.rule.undoes) {
     status.next = Act::undo;
     status.next_ns = std::max(life.due_ns(), life.not_before_ns);
-  } else if (!life.last.holds && !life.in_effect && life.last.next_ns != kForever) {
+  } else if (!life.last.holds() && !life.in_effect && life.last.next_ns != kForever) {
     status.next = Act::do_;  // if nothing is told until then
     status.next_ns = std::max(later_by(life.last.next_ns, life.rule.for_ns), life.not_before_ns);
   }

@@ -35,13 +35,18 @@ bool is_outcome(const Decision& decision) noexcept {
 
 }  // namespace
 
-RuleRunner::RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
-                       std::map<std::string, std::string> topics)
+RuleRunner::RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules,
+                       const std::vector<RuleActions>& actions, std::map<std::string, std::string> topics,
+                       RuleRunner* before)
     : host_(host),
       clock_(host.clock()),
-      engine_(std::move(engine)),
-      feeds_({.architecture = host.architecture(), .clock = host.clock(), .topics = std::move(topics)}),
+      engine_(
+          std::make_unique<Engine>(std::move(rules), before != nullptr ? before->engine_.get() : nullptr)),
+      feeds_(before != nullptr ? before->feeds_
+                               : std::make_shared<Feeds>(
+                                     FeedPlace{.architecture = host.architecture(), .clock = host.clock()})),
       trace_number_(host.architecture().trace_number("(rules)")) {
+  MAUVE_EXPECTS(before == nullptr || (!before->runs_ && &before->host_ == &host));
   if (actions.size() != engine_->size())
     throw Error(ErrorCode::invalid_argument, "every rule of the engine has its actions, and only these");
   for (const RuleActions& each : actions) {
@@ -53,12 +58,39 @@ RuleRunner::RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::ve
     rules_.back()->applied = UINT64_MAX;
     rules_.back()->name = TraceNames::intern(rule.name);
   }
-  for (const auto& heard : engine_->signals()) feeds_.open(heard.spec, *heard.signal);
+  feeds_->set_topics(std::move(topics));
+  const auto same = [&](std::size_t i) { return before != nullptr ? before->find(*this, i) : std::nullopt; };
+  try {
+    for (const auto& heard : engine_->signals()) {
+      if (!same(heard.rule)) feeds_->open(heard.spec, *heard.signal);
+    }
+  } catch (...) {
+    for (const auto& heard : engine_->signals()) feeds_->close(*heard.signal);
+    throw;
+  }
+  if (before == nullptr) return;
+  const bool is_same_deployment = before->epoch_ns_ == host.epoch_ns();  // else its components stood still
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    if (const auto number = same(i)) engine_->go_on(i, *before->engine_, *number, is_same_deployment);
+  }
+  for (const auto& heard : before->engine_->signals()) feeds_->close(*heard.signal);
+  before->feeds_ = std::make_shared<Feeds>(FeedPlace{.architecture = host.architecture(), .clock = clock_});
+}
+
+/// The number here of a rule of the other one that is the same, with the same steps.
+std::optional<std::size_t> RuleRunner::find(const RuleRunner& other, std::size_t rule) const {
+  const std::optional<std::size_t> found = engine_->find(other.engine_->rule(rule));
+  if (!found) return std::nullopt;
+  for (const Act act : kPrepared) {
+    if (rules_[*found]->action(act).steps() != other.rules_[rule]->action(act).steps()) return std::nullopt;
+  }
+  return found;
 }
 
 RuleRunner::~RuleRunner() { stop(); }
 
 void RuleRunner::start() {
+  epoch_ns_ = host_.epoch_ns();
   if (runs_ || host_.is_simulated()) return;
   ending_.store(0, std::memory_order_relaxed);  // the threads' creation publishes it
   host_.architecture().changes().set_listener(&work_);
@@ -418,7 +450,7 @@ bool RuleRunner::look_around() {
 /// Why something cannot be heard.
 std::string RuleRunner::follow() {
   try {
-    feeds_.follow();
+    feeds_->follow();
     return {};
   } catch (const std::exception& failure) {
     return failure.what();

@@ -35,8 +35,7 @@ void Signal::tell(time_ns_t time_ns, double value) noexcept {
   const Bounds quiet{.low = low_.load(std::memory_order_seq_cst),
                      .high = high_.load(std::memory_order_seq_cst)};
   if (quiet.contains(value)) return;
-  word_.fetch_add(1, std::memory_order_release);
-  futex_wake_all(word_);
+  word_->bump();
 }
 
 void Signal::cross(time_ns_t time_ns, double value) noexcept {

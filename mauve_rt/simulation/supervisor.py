@@ -60,9 +60,16 @@ class SimulatedSupervisor:
         return resolved(topic, self._executor.namespace)
 
     def _listen(
-        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, latched: bool = False
+        self,
+        topic: str,
+        message: Any,
+        heard: Callable[[Any], None],
+        *,
+        raw: bool,
+        latched: bool = False,
+        kept: bool = False,
     ) -> None:
-        del message, latched  # whoever listens does so from the start on
+        del message, latched, kept  # whoever listens does so from the start on
 
         def hear(sample: Sample) -> None:
             heard(sample.data if raw else sample.message())

@@ -38,6 +38,7 @@ _WORDS: Mapping[str, Words] = {
 }
 
 
+_HOLDS = {"condition_true": True, "condition_false": False, "condition_unknown": None}
 _FIXED = {
     "armed": "watching",
     "adopted": "what it does is in effect already: undone when it is time",
@@ -61,8 +62,8 @@ def reason_of(decision: RuleDecision, rules: Sequence[Rule], *, name: Name = str
     lasted_s = max(decision.stamp_ns - decision.cause_ns, 0) / 1e9
     what = _reserve_words(rule) if act == "otherwise" else ", ".join(str(step) for step in rule.steps(act))
     match kind:
-        case "condition_true" | "condition_false":
-            return condition_words(rule.when, holds=kind == "condition_true", measured=measured, name=name)
+        case "condition_true" | "condition_false" | "condition_unknown":
+            return condition_words(rule.when, holds=_HOLDS[kind], measured=measured, name=name)
         case "do" | "undo":
             said = condition_words(rule.when, holds=kind == "do", measured=measured, name=name)
             return f"{said} for {lasted_s:.2f} s" if kind == "undo" else said
@@ -93,8 +94,10 @@ def _not_done(decision: RuleDecision, rules: Sequence[Rule], failure: str) -> st
     return f"no {decision.act}: {why}{waits}"
 
 
-def condition_words(when: When, *, holds: bool, measured: float, name: Name = str) -> str:
-    """A condition, as it is; of several, which they are."""
+def condition_words(when: When, *, holds: bool | None, measured: float, name: Name = str) -> str:
+    """A condition, as it is (None: unknown); of several, which they are."""
+    if holds is None:
+        return f"not known now: {tree_words(when, name=name)}"
     if when.kind not in COMBINATIONS:
         return _leaf_words(when, holds=holds, measured=measured, name=name)
     said = tree_words(when, name=name)

@@ -8,7 +8,7 @@ from mauve_rt.supervision.decision_words import Name, reason_of
 from mauve_rt.supervision.rules import Rule
 
 NO_SILENCE_S = -1.0  # of a condition that knows no silence
-_WITHOUT_ACT = ("armed", "condition_true", "condition_false")
+_WITHOUT_ACT = ("armed", "condition_true", "condition_false", "condition_unknown")
 
 
 @dataclass(frozen=True, kw_only=True)

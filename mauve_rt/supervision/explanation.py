@@ -57,7 +57,8 @@ class Standing:
     who: str
     rule: str
     armed: bool = False
-    holds: bool = False
+    condition: str = "false"
+    """true, false or unknown."""
     in_effect: bool = False
     since_ns: int = 0
     """When it began to be in effect, or ceased to."""
@@ -70,9 +71,10 @@ class Standing:
         self.last = entry
         match entry.decision:
             case "armed":
-                self.armed, self.holds, self.hindered = True, False, None
-            case "condition_true" | "condition_false":
-                self.armed, self.holds, self.hindered = True, entry.decision == "condition_true", None
+                self.armed, self.condition, self.hindered = True, "false", None
+            case "condition_true" | "condition_false" | "condition_unknown":
+                self.condition = entry.decision.removeprefix("condition_")
+                self.armed, self.hindered = True, None
             case "do" | "undo":
                 self.armed, self.hindered = True, None
             case "otherwise":
@@ -151,14 +153,13 @@ def _how(one: Standing, begin_ns: int) -> str:
         effect = f"in effect since {_seconds(one.since_ns, begin_ns).strip()}"
     if not one.armed:
         return f"{effect}, does not watch"
-    return f"{effect}, its condition is {'true' if one.holds else 'false'}{_wanting(one)}"
+    return f"{effect}, its condition is {one.condition}{_wanting(one)}"
 
 
 def _wanting(one: Standing) -> str:
     """Why that is not what its condition asks for."""
-    if one.holds == one.in_effect:
-        return ""
-    if one.hindered is None:
+    as_asked = one.condition == "unknown" or (one.condition == "true") == one.in_effect
+    if as_asked or one.hindered is None:
         return ""
     return f"; it did not act: {one.hindered.reason or one.hindered.why or one.hindered.decision}"
 

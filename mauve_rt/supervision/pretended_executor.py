@@ -15,7 +15,7 @@ INSTANCE = "pretended"
 
 @dataclass
 class PretendedExecutor:
-    """Its components are those that rules are about; they run as what undoes the rules leaves them."""
+    """Its components are those that rules touch or look at; they run as what undoes the rules leaves them."""
 
     rules: Iterable[Rule]
 
@@ -24,6 +24,9 @@ class PretendedExecutor:
         self._resources: set[str] = set()
         self._revision = 1
         for rule in self.rules:
+            for leaf in rule.when.leaves():
+                if component := leaf.parameters.get("component"):
+                    self._add(str(component))
             for step in rule.do:
                 self._be_there(step)
             for step in rule.undo.do if rule.undo is not None else []:
@@ -50,9 +53,12 @@ class PretendedExecutor:
         """What a step needs before it can be done."""
         kind = STEP_KINDS[step.kind]
         if kind.target == "component":
-            self._components.setdefault(step.target, ListedComponent(state="RUNNING", core="its own"))
+            self._add(step.target)
         elif kind.target == "resource":
             self._resources.add(step.target)
+
+    def _add(self, component: str) -> None:
+        self._components.setdefault(component, ListedComponent(state="RUNNING", core="its own"))
 
     def _take(self, step: Step) -> None:
         kind = STEP_KINDS[step.kind]

@@ -61,14 +61,14 @@ def _unarmed(file: RulesFile, rule: Rule, tree: When, *, negated: bool = False) 
         yield from _unarmed(file, rule, part, negated=negated is not (tree.kind == NOT))
     if tree.kind in COMBINATIONS or negated:
         return
-    for signal in heard(tree):
-        if signal.kind == "state" and signal.target in rule.targets():
-            what = (
-                f"rule '{rule.name}' can never act: it waits until {signal.target} is FAULTED, "
-                f"and for what it does {signal.target} has to run"
-            )
-            remedy = f"give {signal.target} a fallback core, or let the supervisor configure and start it"
-            yield file.problem((*tree.place, tree.kind), what, remedy=remedy)
+    signal, *_ = heard(tree)  # what it is about is the first
+    if signal.kind == "state" and signal.target in rule.targets():
+        what = (
+            f"rule '{rule.name}' can never act: it waits until {signal.target} is FAULTED, "
+            f"and for what it does {signal.target} has to run"
+        )
+        remedy = f"give {signal.target} a fallback core, or let the supervisor configure and start it"
+        yield file.problem((*tree.place, tree.kind), what, remedy=remedy)
 
 
 def _rivals(file: RulesFile) -> Iterator[Problem]:

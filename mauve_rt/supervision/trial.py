@@ -12,7 +12,7 @@ from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.script import Heard, Script
 
 COLUMNS = 60
-LEGEND = "heard: -   rules: . false   ? true, not acted on   # in effect"
+LEGEND = "heard: -   rules: ~ unknown   . false   ? true, not acted on   # in effect"
 
 
 class Trial:
@@ -111,6 +111,8 @@ class Trial:
             return "#"
         if not status.armed:
             return " "
+        if not status.known:
+            return "~"
         return "?" if status.holds else "."
 
     def _column(self) -> int:

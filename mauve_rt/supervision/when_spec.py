@@ -22,7 +22,7 @@ def nanoseconds(seconds: float) -> int:
 
 
 def heard(leaf: When) -> list[SignalSpec]:
-    """What a condition hears.
+    """What a condition hears; the first signal is what it is about.
 
     Raises:
         MauveError: what it was told makes no sense together.

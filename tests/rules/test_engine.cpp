@@ -68,7 +68,16 @@ struct Tried {
       words.push_back(word);
     }
   }
-  bool holds(std::size_t i = 0) { return engine.status(i).holds; }
+  /// Of the component that the signal is about.
+  void tell_state(std::size_t i, ComponentState state) {
+    const SignalSpec wanted{SignalKind::state, engine.signals().at(i).spec.target};
+    for (const Engine::Heard& heard : engine.signals()) {
+      if (heard.spec == wanted) heard.signal->tell(now_ns, static_cast<double>(state));
+    }
+    run_to(now_ns);
+  }
+  bool holds(std::size_t i = 0) { return engine.status(i).holds(); }
+  Truth truth(std::size_t i = 0) { return engine.status(i).truth; }
 
   Engine engine;
   time_ns_t now_ns{0};
@@ -233,21 +242,118 @@ TEST(Conditions, StatesPeersDiagnosticsAndBooleansAreLookedUp) {
                rule("peer", leaf("peer", {{"executor", "e"}})),
                rule("diagnostic", leaf("diagnostic", {{"status", "s"}})),
                rule("boolean", leaf("boolean", {{"topic", "t"}, {"is", false}}))});
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_FALSE(tried.holds(i)) << "nothing is known yet: " << i;
-  tried.tell(0, static_cast<double>(ComponentState::running));
-  EXPECT_FALSE(tried.holds(0));
-  tried.tell(0, static_cast<double>(ComponentState::faulted));
-  EXPECT_TRUE(tried.holds(0));
-  tried.tell(1, static_cast<double>(PeerState::gone));
-  EXPECT_TRUE(tried.holds(1));
-  tried.tell(2, 1);
-  EXPECT_FALSE(tried.holds(2));
-  tried.tell(2, 2);
-  EXPECT_TRUE(tried.holds(2));
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(Truth::unknown, tried.truth(i)) << i;
+  tried.tell_state(0, ComponentState::running);
+  EXPECT_EQ(Truth::no, tried.truth(0));
+  tried.tell_state(0, ComponentState::faulted);
+  EXPECT_EQ(Truth::yes, tried.truth(0));
+  tried.tell(2, static_cast<double>(PeerState::unheard));
+  EXPECT_EQ(Truth::unknown, tried.truth(1)) << "it may be gone";
+  tried.tell(2, static_cast<double>(PeerState::there));
+  EXPECT_EQ(Truth::no, tried.truth(1));
+  tried.tell(2, static_cast<double>(PeerState::gone));
+  EXPECT_EQ(Truth::yes, tried.truth(1));
   tried.tell(3, 1);
-  EXPECT_FALSE(tried.holds(3));
-  tried.tell(3, 0);
-  EXPECT_TRUE(tried.holds(3));
+  EXPECT_EQ(Truth::no, tried.truth(2));
+  tried.tell(3, 2);
+  EXPECT_EQ(Truth::yes, tried.truth(2));
+  tried.tell(4, 1);
+  EXPECT_EQ(Truth::no, tried.truth(3));
+  tried.tell(4, 0);
+  EXPECT_EQ(Truth::yes, tried.truth(3));
+}
+
+TEST(Conditions, ThatAPeerWasNeverReceivedIsKnown) {
+  Tried tried({rule("unheard", leaf("peer", {{"executor", "e"}, {"is", "unheard"}}))});
+  tried.tell(0, static_cast<double>(PeerState::unheard));
+  EXPECT_EQ(Truth::yes, tried.truth());
+  tried.tell(0, static_cast<double>(PeerState::there));
+  EXPECT_EQ(Truth::no, tried.truth());
+}
+
+TEST(Conditions, ThatNothingHappensToAComponentIsUnknownWhileItDoesNotRun) {
+  for (const char* kind : {"overruns", "over_declared", "fault"}) {
+    Tried tried({rule("r", leaf(kind, {{"component", "c"}}))});
+    EXPECT_EQ(Truth::unknown, tried.truth()) << kind;
+    tried.tell_state(0, ComponentState::running);
+    EXPECT_EQ(Truth::no, tried.truth()) << kind;
+    tried.tell_state(0, ComponentState::stopped);
+    EXPECT_EQ(Truth::unknown, tried.truth()) << kind;
+    tried.run_to(ms(5));
+    tried.tell_state(0, ComponentState::running);
+    EXPECT_EQ(Truth::no, tried.truth()) << kind;
+    EXPECT_EQ(ms(5), tried.engine.status(0).since_ns) << "the evidence was broken: " << kind;
+  }
+}
+
+TEST(Conditions, WhatHasHappenedToAComponentIsKnownThoughItStops) {
+  Tried tried({rule("r", leaf("overruns", {{"component", "c"}, {"within_s", 1.0}}))});
+  tried.tell_state(0, ComponentState::running);
+  tried.tell(0, 1);
+  tried.tell_state(0, ComponentState::stopped);
+  EXPECT_EQ(Truth::yes, tried.truth());
+  tried.run_to(ms(1'001));
+  EXPECT_EQ(Truth::unknown, tried.truth());
+}
+
+TEST(Conditions, AFirstValueWithinTheHysteresisShowsNothing) {
+  const auto above = leaf("value", {{"topic", "t"}, {"field", "v"}, {"above", 10.0}, {"hysteresis", 2.0}});
+  Tried tried({rule("r", above)});
+  tried.tell(0, 9.0);
+  EXPECT_EQ(Truth::unknown, tried.truth()) << "it may have been above 10 before";
+  tried.tell(0, 7.0);
+  EXPECT_EQ(Truth::no, tried.truth());
+  tried.tell(0, 9.0);
+  EXPECT_EQ(Truth::no, tried.truth());
+  tried.tell(0, 11.0);
+  tried.tell(0, 9.0);
+  EXPECT_EQ(Truth::yes, tried.truth());
+}
+
+TEST(Conditions, CombinationsFollowKleenesThreeValues) {
+  const auto boolean = [](const char* topic) { return leaf("boolean", {{"topic", topic}}); };
+  const std::vector<When> parts{boolean("a"), boolean("b"), boolean("c")};
+  constexpr std::array kTruths{Truth::no, Truth::yes, Truth::unknown};
+  for (int i = 0; i < 27; ++i) {
+    const std::array told{kTruths[i % 3], kTruths[i / 3 % 3], kTruths[i / 9]};
+    Tried one({rule("all", combine("all", parts)), rule("any", combine("any", parts)),
+               rule("two", combine("at_least", parts, 2)), rule("not", combine("not", {boolean("a")}))});
+    for (std::size_t at = 0; at < one.engine.signals().size(); ++at) {
+      if (const Truth truth = told[at % 3]; truth != Truth::unknown)
+        one.tell(at, truth == Truth::yes ? 1 : 0);
+    }
+    const auto count = [&](Truth truth) { return std::count(told.begin(), told.end(), truth); };
+    const auto at_least = [&](int many) {
+      if (count(Truth::yes) >= many) return Truth::yes;
+      return 3 - count(Truth::no) < many ? Truth::no : Truth::unknown;
+    };
+    EXPECT_EQ(at_least(3), one.truth(0)) << i;
+    EXPECT_EQ(at_least(1), one.truth(1)) << i;
+    EXPECT_EQ(at_least(2), one.truth(2)) << i;
+    EXPECT_EQ(told[0] == Truth::unknown ? Truth::unknown : truth_of(told[0] == Truth::no), one.truth(3)) << i;
+  }
+}
+
+TEST(Conditions, ForNeedsUnbrokenEvidence) {
+  When overruns = leaf("overruns", {{"component", "c"}, {"within_s", 1e-3}});
+  When calm = combine("not", {overruns});
+  calm.for_ns = ms(10);
+  Tried tried({rule("calm", calm)});
+  tried.tell_state(0, ComponentState::running);
+  tried.run_to(ms(9));
+  EXPECT_EQ(Truth::unknown, tried.truth()) << "whether it was calm before nobody knows";
+  tried.tell_state(0, ComponentState::stopped);
+  tried.run_to(ms(20));
+  EXPECT_EQ(Truth::unknown, tried.truth());
+  tried.tell_state(0, ComponentState::running);
+  tried.run_to(ms(29));
+  EXPECT_EQ(Truth::unknown, tried.truth());
+  tried.run_to(ms(31));
+  EXPECT_EQ(Truth::yes, tried.truth());
+  tried.tell(0, 1);
+  EXPECT_EQ(Truth::no, tried.truth());
+  tried.run_to(ms(35));
+  EXPECT_EQ(Truth::no, tried.truth()) << "it was not, and has not been for long enough";
 }
 
 TEST(Conditions, OnePeerLostOfThree) {
@@ -320,7 +426,11 @@ TEST(Conditions, EachKindOfTheTableCanBeMadeFromWhatItRequires) {
       if (spec.type != "float") when.parameters[spec.name] = std::string("x");
     }
     Tried tried({rule("r", when)});
-    EXPECT_EQ(1U, tried.engine.signals().size()) << kind.name;
+    const auto& heard = tried.engine.signals();
+    const auto is_state = [](const auto& each) { return each.spec.kind == SignalKind::state; };
+    const auto states = std::count_if(heard.begin(), heard.end(), is_state);
+    EXPECT_EQ(1 + (states > 0 ? 1 : 0), std::ssize(heard))
+        << "what it is about, and whether that runs: " << kind.name;
     EXPECT_FALSE(kind.summary.empty());
     tried.run_to(ms(1));
     EXPECT_FALSE(tried.holds()) << kind.name;
@@ -643,6 +753,59 @@ TEST(Rules, WhoStartsWhileItIsInEffectUndoesIt) {
   tried.tell(0);
   EXPECT_FALSE(tried.engine.status(0).in_effect);
   EXPECT_EQ("100 r done", tried.words.back());
+}
+
+/// An emergency stop by a value that is published once: in effect, and the engine is a new one.
+struct AdoptedStop : Tried {
+  AdoptedStop() : Tried({stop()}) {
+    engine.adopt(0, 0);
+    take();
+    words.clear();
+  }
+  static Rule stop() {
+    return {.name = "stop",
+            .when = leaf("boolean", {{"topic", "pressed"}}),
+            .undoes = true,
+            .undo_for_ns = ms(500),
+            .about = {"base"}};
+  }
+};
+
+TEST(Rules, WhatIsInEffectStaysWhileNothingIsKnown) {
+  AdoptedStop tried;
+  tried.run_to(s_to_ns(60));
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
+  EXPECT_THAT(tried.words, ElementsAre("0 stop condition_unknown"));
+  EXPECT_FALSE(tried.engine.status(0).next);
+}
+
+TEST(Rules, TheDwellOfUndoCountsFromTheFirstThatIsKnown) {
+  AdoptedStop tried;
+  tried.run_to(ms(2'000));
+  tried.words.clear();
+  tried.tell(0, 0.0);
+  tried.run_to(ms(2'600));
+  EXPECT_THAT(tried.words, ElementsAre("2000 stop condition_false", "2500 stop undo", "2500 stop done"));
+}
+
+TEST(Rules, WhatWasDueIsStillDoneWhenTheConditionBecomesUnknown) {
+  Tried tried({{.name = "r",
+                .when = leaf("overruns", {{"component", "c"}, {"within_s", 0.1}}),
+                .undoes = true,
+                .about = {"a"}}});
+  tried.ending = Ended::refused;
+  tried.tell_state(0, ComponentState::running);
+  tried.tell(0, 1);
+  tried.tell_state(0, ComponentState::stopped);
+  tried.run_to(ms(200));
+  EXPECT_EQ(Truth::unknown, tried.truth());
+  tried.ending = Ended::done;
+  tried.run_to(ms(600));
+  EXPECT_TRUE(tried.engine.status(0).in_effect) << "the second try";
+  tried.run_to(s_to_ns(60));
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
+  tried.tell_state(0, ComponentState::running);
+  EXPECT_FALSE(tried.engine.status(0).in_effect);
 }
 
 TEST(Rules, WhatSomebodyElseDidIsNotUndone) {

@@ -94,9 +94,18 @@ class RuleRunnerTest : public Hosted<Way> {
                      .about = {"c"}});
     actions.push_back({.do_steps = std::move(act), .undo_steps = std::move(undo)});
   }
-  void make() {
-    runner = std::make_unique<RuleRunner>(this->host(), std::make_unique<Engine>(rules), actions,
-                                          std::move(topics));
+  void make() { runner = std::make_unique<RuleRunner>(this->host(), rules, actions, std::move(topics)); }
+  /// The rules take the place of those that were at work; `in_between` happens while none is.
+  void load(const std::function<void()>& in_between = [] {}) {
+    runner->stop();
+    take();
+    words.clear();
+    from = 0;
+    in_between();
+    auto next = std::make_unique<RuleRunner>(this->host(), rules, actions, topics, runner.get());
+    runner = std::move(next);
+    runner->start();
+    see("armed");
   }
   void begin() {
     make();
@@ -115,6 +124,10 @@ class RuleRunnerTest : public Hosted<Way> {
         ADD_FAILURE() << facts.name << (facts.ready ? " is ready " : " is not ready ") << facts.problem;
     }
     from = static_cast<std::ptrdiff_t>(words.size());
+  }
+  /// The same, where it may have been told before: in virtual time much happens in one look.
+  void see_once(const std::string& word) {
+    if (std::count(words.begin(), words.end(), word) == 0) see(word);
   }
   void live(time_ns_t duration_ns) {
     for (const time_ns_t until = this->host().now_ns() + duration_ns; this->host().now_ns() < until;) {
@@ -345,7 +358,7 @@ TYPED_TEST(RuleRunnerTest, KeepsActionsApartInAStorm) {
     const std::vector<RuleFacts> facts = this->runner->facts();
     return this->present() == "t/Core" && this->watched->shown().core == "t/Core" &&
            std::none_of(facts.begin(), facts.end(),
-                        [](const RuleFacts& each) { return each.status.holds || each.status.in_effect; });
+                        [](const RuleFacts& each) { return each.status.holds() || each.status.in_effect; });
   };
   this->way.until(is_calm, "all to be undone");
   this->runner->stop();
@@ -575,6 +588,114 @@ TYPED_TEST(RuleRunnerTest, IsNotArmedBeforeItsComponentRuns) {
   this->host().start("c");
   this->see("done");
   EXPECT_EQ("armed", this->words.front());
+}
+
+// ---- what there is at the start, and from one set of rules to the next
+
+TYPED_TEST(RuleRunnerTest, BeginsWithTheValueThatIsThere) {
+  this->add_rule(too_high());
+  this->deploy();
+  this->beat.write.write({.value = 4.0}, 1);
+  this->begin();
+  this->see_once("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+TYPED_TEST(RuleRunnerTest, KnowsNothingOfAResourceThatWasNeverWritten) {
+  this->add_rule({.kind = "not", .parts = {too_high()}});
+  this->deploy();
+  this->begin();
+  this->live(ms_to_ns(20));
+  EXPECT_EQ("t/Core", this->present());
+  EXPECT_EQ(Truth::unknown, this->runner->facts()[0].status.truth);
+  this->beat.write.write({.value = 1.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+TYPED_TEST(RuleRunnerTest, AStopByAValueThatStaysIsNotUndoneByNewRules) {
+  this->add_rule(too_high());
+  this->deploy();
+  this->begin();
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  this->load();
+  this->live(ms_to_ns(20));
+  EXPECT_THAT(this->words, ElementsAre("armed")) << "the same rule goes on";
+  EXPECT_TRUE(this->runner->facts()[0].status.in_effect);
+  this->rules[0].undo_for_ns = ms_to_ns(1);  // another rule of the name, about the same
+  this->load();
+  this->live(ms_to_ns(20));
+  EXPECT_TRUE(this->runner->facts()[0].status.in_effect);
+  EXPECT_EQ("t/Counting", this->present());
+  this->beat.write.write({.value = 1.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(RuleRunnerTest, NothingIsMissedFromOneSetOfRulesToTheNext) {
+  this->add_rule(too_high());
+  this->deploy();
+  this->begin();
+  this->load([this] {
+    for (const double value : {2.0, 4.0, 2.0}) this->beat.write.write({.value = value}, 1);
+  });
+  this->see_once("condition_true");
+}
+
+TYPED_TEST(RuleRunnerTest, DwellTimesGoOnFromOneSetOfRulesToTheNext) {
+  this->add_rule(too_high());
+  this->rules.back().for_ns = ms_to_ns(200);
+  this->deploy();
+  this->begin();
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("condition_true");
+  const time_ns_t true_ns = this->last(Decided::condition_true).decision.cause_ns;
+  for (int i = 0; i < 5; ++i) {
+    this->live(ms_to_ns(20));
+    this->load();
+  }
+  this->see_once("done");
+  EXPECT_EQ(true_ns, this->last(Decided::do_).decision.cause_ns);
+}
+
+TYPED_TEST(RuleRunnerTest, NewRulesThatCannotHearLeaveTheOldOnesAsTheyWere) {
+  this->add_rule(too_high());
+  this->deploy();
+  this->begin();
+  this->beat.write.write({.value = 4.0}, 1);
+  this->see("done");
+  this->runner->stop();
+  const auto good = this->rules;
+  this->add_rule(leaf("silence", {{"resource", "nothing"}, {"longer_than_s", 1.0}}));
+  const auto make = [&] { RuleRunner(this->host(), this->rules, this->actions, {}, this->runner.get()); };
+  EXPECT_THAT(this->refusal(make).what(), HasSubstr("nothing"));
+  this->rules = good;
+  this->actions.pop_back();
+  this->load();
+  this->live(ms_to_ns(20));
+  EXPECT_TRUE(this->runner->facts()[0].status.in_effect);
+  this->beat.write.write({.value = 1.0}, 1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(RuleRunnerTest, RulesAboutOneComponentComeAndGo) {
+  this->add_rule(leaf("fault", {{"component", "w"}}));
+  this->deploy();
+  this->begin();
+  for (int i = 0; i < 10; ++i) {
+    this->add_rule(leaf("overruns", {{"component", "w"}}), {});
+    this->load();
+    this->rules.pop_back();
+    this->actions.pop_back();
+    this->load();
+  }
+  this->host().stop("w", s_to_ns(10));
+  this->core(*this->watched).work = [] { throw std::runtime_error("broken"); };
+  this->host().start("w");
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
 }
 
 // ---- what it hears

@@ -38,7 +38,7 @@ TEST(Trial, AConditionIsOneFileAndALine) {
   for (const auto& [value, holds] : {std::pair(2.0, false), std::pair(3.0, true)}) {
     engine.signals()[0].signal->tell(1, value);
     engine.step(1);
-    EXPECT_EQ(holds, engine.status(0).holds) << value;
+    EXPECT_EQ(holds, engine.status(0).holds()) << value;
   }
 }
 

@@ -56,7 +56,7 @@ inline void random_ends(std::uint64_t seed, seeds::Findings& findings) {
     Deployer deployer(architecture);
     deployer.deploy();
     for (int times = dice.below(3); times > 0; --times) {
-      rules::RuleRunner runner(deployer, std::make_unique<rules::Engine>(std::vector<rules::Rule>{}), {});
+      rules::RuleRunner runner(deployer, {}, {});
       runner.start();
       beside([&] { architecture.changes().bump(); },
              [&] {

@@ -17,6 +17,7 @@ from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
 from mauve_rt.node.executor.rules import OwnRules
+from mauve_rt.supervision.truth import truth_word
 
 _ONE = ThresholdModel(warn=1)
 _DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
@@ -206,7 +207,7 @@ class Diagnostics:
             level, message = DiagnosticStatus.ERROR, f"cannot act: {facts.problem}"
         values: dict[str, object] = {
             "armed": status.armed,
-            "condition": status.holds,
+            "condition": truth_word(status),
             "in_effect": status.in_effect,
             "ready": facts.ready,
             "measured": status.measured,
@@ -288,4 +289,6 @@ def _standing(facts: RuleFacts) -> str:
         return "in effect"
     if status.changed_by_another:
         return "what it did was changed by another requester: it waits for its condition's end"
+    if not status.known:
+        return "its condition is unknown: nothing was received yet of what it is about"
     return "its condition holds" if status.holds else "watching"

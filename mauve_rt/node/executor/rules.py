@@ -33,6 +33,7 @@ class OwnRules:
     | `_loaded`  | configure(), load(), close()        | the same  | `_lock`             |
     | `_runner`, | start(), stop(), load(), close()    | any       | `_lock` to write; each |
     | `_at_work` |                                     |           | is exchanged whole  |
+    | `_rested`  | the same                            | the same  | `_lock`             |
     """
 
     def __init__(
@@ -66,6 +67,7 @@ class OwnRules:
         self._lock = threading.RLock()
         self._loaded: LoadedRules | None = None
         self._runner: RuleRunner | None = None
+        self._rested: RuleRunner | None = None  # stopped: what the next one goes on from
         self._at_work: list[str] = []
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
@@ -92,7 +94,7 @@ class OwnRules:
                 self._begin(self._loaded)
 
     def stop(self) -> None:
-        """Nothing is done any more; all that was decided is told."""
+        """Nothing is done any more; all that was decided is told. The rules go on at the next start()."""
         with self._lock:
             self._end()
 
@@ -100,7 +102,7 @@ class OwnRules:
         """Forget the file."""
         with self._lock:
             self._end()
-            self._loaded = None
+            self._loaded = self._rested = None
 
     def load(self, path: str) -> int:
         """Put the rules of a file in the place of the present ones, all or none; returns how many there are.
@@ -112,6 +114,8 @@ class OwnRules:
             before = self._loaded
             if not path and before is None:
                 raise ParameterError("no rules were loaded yet: name a file")
+            if self._runner is None:
+                self._rested = None  # the check of the new ones listens to the same components
             loaded = self._load(Path(path) if path or before is None else before.path)
             if self._runner is not None or self._runtime.active:
                 self._end()
@@ -122,7 +126,7 @@ class OwnRules:
                     if before is not None and before.rules:
                         self._begin(before)
                     raise
-            self._loaded = loaded
+            self._loaded, self._rested = loaded, None
             return len(loaded.rules)
 
     def _load(self, path: Path) -> "LoadedRules":
@@ -141,7 +145,8 @@ class OwnRules:
 
     def _begin(self, loaded: "LoadedRules") -> None:
         topics = self._topics_of(loaded.rules)
-        runner = loaded.runner(self._runtime.host, topics)
+        runner = loaded.runner(self._runtime.host, topics, self._rested)
+        self._rested = None
         self._listen(_silent(loaded.rules, topics))
         runner.start()
         self._runner, self._at_work = runner, [rule.name for rule in loaded.rules]
@@ -155,6 +160,7 @@ class OwnRules:
         if runner is None:
             return
         runner.stop()
+        self._rested = runner
         self._listen(set())
         self._ending.set()
         runner.wake()

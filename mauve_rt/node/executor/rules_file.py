@@ -43,9 +43,9 @@ class LoadedRules:
             raise ArchitectureFileError(file.path, found_unobservable)
         return cls(path, rules, rule_actions(file, runtime))
 
-    def runner(self, host: Host, topics: Mapping[str, str]) -> RuleRunner:
-        """What runs them, not started yet."""
-        return RuleRunner(host, rule_specs(self.rules, with_reserve=True), self.actions, dict(topics))
+    def runner(self, host: Host, topics: Mapping[str, str], before: RuleRunner | None) -> RuleRunner:
+        """What runs them, not started yet; `before`: whose place it takes."""
+        return RuleRunner(host, rule_specs(self.rules, with_reserve=True), self.actions, dict(topics), before)
 
     def messages(self, runtime: Runtime, *, who: str, name: Callable[[str], str]) -> DecisionMessages:
         """What makes messages of their decisions."""

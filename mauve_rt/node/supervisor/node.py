@@ -84,21 +84,46 @@ class Supervisor:
         self._listen(f"{executor}/state", ArchitectureState, self._on_state, raw=False, latched=True)
 
     def _listen(
-        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, latched: bool = False
+        self,
+        topic: str,
+        message: Any,
+        heard: Callable[[Any], None],
+        *,
+        raw: bool,
+        latched: bool = False,
+        kept: bool = False,
     ) -> None:
-        def hear(sample: Any) -> None:
+        newest_ns = 0  # by the writers' clocks
+
+        def hear(sample: Any, info: Any) -> None:
+            nonlocal newest_ns
+            newest_ns = max(newest_ns, info["source_timestamp"])
             heard(sample)
             if latched or self._rules.is_stirred:
                 self._tick()
 
-        # Best effort hears reliable writers too; only that something came counts.
-        qos = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-        events = None
+        def hear_kept(sample: Any, info: Any) -> None:
+            if info["source_timestamp"] > newest_ns:  # else it was heard by best effort
+                hear(sample, info)
+
+        def subscribe(qos: QoSProfile, hear: Callable[[Any, Any], None], events: Any = None) -> None:
+            guarded = self.watch.guarded(topic, hear)
+
+            def callback(sample: Any, info: Any) -> None:  # rclpy counts its parameters
+                guarded(sample, info)
+
+            taken: Any = callback  # its stubs know one parameter only
+            self._node.create_subscription(message, topic, taken, qos, raw=raw, event_callbacks=events)
+
+        keeping = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         if latched:
-            qos = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
             events = SubscriptionEventCallbacks(liveliness=partial(self._on_liveliness, topic))
-        guarded = self.watch.guarded(topic, hear)
-        self._node.create_subscription(message, topic, guarded, qos, raw=raw, event_callbacks=events)
+            subscribe(keeping, hear, events)
+            return
+        # Best effort hears reliable writers too; only that something came counts.
+        subscribe(QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT), hear)
+        if kept:  # of writers that do not keep their last message this one hears nothing, which is no news
+            subscribe(keeping, hear_kept, SubscriptionEventCallbacks(use_default_callbacks=False))
 
     def _on_liveliness(self, topic: str, event: Any) -> None:
         """Sooner than silence tells, where the middleware does at all."""

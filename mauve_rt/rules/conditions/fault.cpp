@@ -10,12 +10,10 @@ ConditionKind fault_kind() {
       .name = "fault",
       .summary = "a component is FAULTED",
       .parameters = {kComponent},
-      .hears =
-          [](const Parameters& told) {
-            return std::vector{SignalSpec{SignalKind::state, text(told, "component")}};
-          },
+      .hears = [](const Parameters& told) { return heard_of_component(told, SignalKind::state); },
       .make = [](const Parameters& /*told*/, std::span<Signal* const> signals) -> std::unique_ptr<Condition> {
-        return std::make_unique<Equal>(*signals[0], static_cast<double>(ComponentState::faulted));
+        return of_running(std::make_unique<Equal>(*signals[0], static_cast<double>(ComponentState::faulted)),
+                          signals);
       }};
 }
 

@@ -144,23 +144,35 @@ class Age final : public Condition {
   time_ns_t since_ns_{0};
 };
 
-/// Which side of its bounds a signal is on. Each look takes one crossing: a value that was beyond a bound between two looks
-/// makes one look of its own, and the next look follows at once. Of many pulses between two looks one is seen.
+/// Which side of its bounds a signal is on; not known before a first value, nor while the first ones lie between the bounds.
+/// Each look takes one crossing: a value that was beyond a bound between two looks makes one look of its own, and the next
+/// look follows at once. Of many pulses between two looks one is seen.
 class Side {
  public:
   /// [setup]
   Side(Signal& signal, Signal::Bounds inner, Signal::Bounds outer, bool begins_outside)
-      : signal_(signal), begins_outside_(begins_outside), is_outside_(begins_outside) {
+      : signal_(signal),
+        inner_(inner),
+        outer_(outer),
+        begins_outside_(begins_outside),
+        is_outside_(begins_outside) {
     signal_.count_crossings(inner, outer, begins_outside);
   }
   /// Only the crossing to where it is now counts of those that were before. [rt]
   void arm(time_ns_t now_ns) MAUVE_RT;
   /// Takes the next crossing; false: there is none. [rt]
   bool cross() MAUVE_RT;
+  /// What was told last, after cross(): without a crossing it can show the side, too. [rt]
+  void hear(const Signal::Last& last) MAUVE_RT;
   /// Whether there is another one to take. [rt]
   bool crosses_again() const MAUVE_RT { return newest() != seen_; }
 
+  bool is_known() const MAUVE_RT { return is_known_; }
   bool is_outside() const MAUVE_RT { return is_outside_; }
+  /// Whether it is outside (or, of a condition about the inside, inside). [rt]
+  Truth truth(bool about_outside) const MAUVE_RT {
+    return is_known_ ? truth_of(is_outside_ == about_outside) : Truth::unknown;
+  }
   time_ns_t since_ns() const MAUVE_RT { return since_ns_; }
   double value() const MAUVE_RT { return value_; }  // of the last crossing that was taken
 
@@ -168,14 +180,16 @@ class Side {
   std::uint64_t newest() const MAUVE_RT { return std::max(signal_.entered().count, signal_.left().count); }
 
   Signal& signal_;
+  const Signal::Bounds inner_, outer_;
   const bool begins_outside_;
   bool is_outside_;
+  bool is_known_{false};
   std::uint64_t seen_{0};  // crossings
   time_ns_t since_ns_{0};
   double value_{0.0};
 };
 
-/// Holds while the value told last is in a range, or outside of it; not before a first one.
+/// Holds while the value told last is outside a range.
 class Range final : public Condition {
  public:
   /// It begins to hold outside [low, high], and ends within what is left of that without `hysteresis` on either side.
@@ -198,13 +212,17 @@ class Range final : public Condition {
 /// Holds while the value told last is this one.
 class Equal final : public Condition {
  public:
-  Equal(Signal& signal, double value)
-      : signal_(signal), side_(signal, {.low = value, .high = value}, {.low = value, .high = value}, true) {}
+  /// `no_news`: a value that says nothing.
+  Equal(Signal& signal, double value, double no_news = std::numeric_limits<double>::quiet_NaN())
+      : signal_(signal),
+        no_news_(no_news),
+        side_(signal, {.low = value, .high = value}, {.low = value, .high = value}, true) {}
   void arm(time_ns_t now_ns) noexcept override { side_.arm(now_ns); }
   Look look(time_ns_t now_ns) noexcept override;
 
  private:
   Signal& signal_;
+  const double no_news_;
   Side side_;
 };
 
@@ -226,8 +244,28 @@ class Often final : public Condition {
   time_ns_t since_ns_{0};
 };
 
+/// What a part says of a component. That nothing happens is unknown while the component does not run.
+class OfRunning final : public Condition {
+ public:
+  OfRunning(std::unique_ptr<Condition> part, Signal& state) : part_(std::move(part)), state_(state) {}
+  void arm(time_ns_t now_ns) noexcept override;
+  void assume() noexcept override { part_->assume(); }
+  Look look(time_ns_t now_ns) noexcept override;
+
+ private:
+  const std::unique_ptr<Condition> part_;
+  Signal& state_;
+  bool runs_{false};
+  time_ns_t since_ns_{0};  // it runs, or does not
+};
+
+/// What a condition hears of its component, and whether that runs; of_running() takes these signals. [setup]
+std::vector<SignalSpec> heard_of_component(const Parameters& parameters, SignalKind kind,
+                                           std::string detail = {});
+std::unique_ptr<Condition> of_running(std::unique_ptr<Condition> part, std::span<Signal* const> signals);
+
 inline constexpr double kMostCounted = 1000;
-/// The parameters of Often, and it. [setup]
+/// The parameters of Often, and it, for a component that runs. [setup]
 std::vector<ParameterSpec> often_parameters(std::vector<ParameterSpec> more = {});
 std::unique_ptr<Condition> make_often(const Parameters& parameters, std::span<Signal* const> signals);
 

@@ -14,8 +14,8 @@ ConditionKind late_kind() {
           .hears =
               [](const Parameters& parameters) {
                 const time_ns_t bound_ns = nanoseconds(told<double>(parameters, "longer_than_s"));
-                return std::vector{SignalSpec{SignalKind::late, text(parameters, "component"),
-                                              text(parameters, "what") + " " + std::to_string(bound_ns)}};
+                return heard_of_component(parameters, SignalKind::late,
+                                          text(parameters, "what") + " " + std::to_string(bound_ns));
               },
           .make = make_often};
 }

@@ -31,7 +31,7 @@ class NoRelease final : public Condition {
       holds_ = holds;
       const double edge = holds ? kInfinity : -kInfinity;  // while it does not hold every release is quiet
       if (!signal_.listen(edge, -edge, last)) continue;
-      return {.holds = holds,
+      return {.truth = truth_of(holds),
               .since_ns = since_ns_,
               .next_ns = holds ? kForever : calm_.next_ns(due_ns),
               .look_ns = holds ? kForever : calm_.look_ns(due_ns),

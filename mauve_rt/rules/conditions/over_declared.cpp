@@ -8,10 +8,7 @@ ConditionKind over_declared_kind() {
       .name = "over_declared",
       .summary = "executions of a component lasted longer than declared, `at_least` times within `within_s`",
       .parameters = often_parameters(),
-      .hears =
-          [](const Parameters& told) {
-            return std::vector{SignalSpec{SignalKind::over_declared, text(told, "component")}};
-          },
+      .hears = [](const Parameters& told) { return heard_of_component(told, SignalKind::over_declared); },
       .make = make_often};
 }
 

@@ -7,10 +7,7 @@ ConditionKind overruns_kind() {
   return {.name = "overruns",
           .summary = "a component overran `at_least` times within `within_s`",
           .parameters = often_parameters(),
-          .hears =
-              [](const Parameters& told) {
-                return std::vector{SignalSpec{SignalKind::overruns, text(told, "component")}};
-              },
+          .hears = [](const Parameters& told) { return heard_of_component(told, SignalKind::overruns); },
           .make = make_often};
 }
 

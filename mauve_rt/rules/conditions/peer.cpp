@@ -13,6 +13,8 @@ PeerState state_of(const std::string& name) {
   return PeerState::gone;
 }
 
+double as_value(PeerState state) { return static_cast<double>(state); }
+
 }  // namespace
 
 ConditionKind peer_kind() {
@@ -29,7 +31,9 @@ ConditionKind peer_kind() {
                 return std::vector{SignalSpec{SignalKind::peer, text(told, "executor")}};
               },
           .make = [](const Parameters& told, std::span<Signal* const> signals) -> std::unique_ptr<Condition> {
-            return std::make_unique<Equal>(*signals[0], static_cast<double>(state_of(text(told, "is"))));
+            const PeerState is = state_of(text(told, "is"));
+            if (is == PeerState::unheard) return std::make_unique<Equal>(*signals[0], as_value(is));
+            return std::make_unique<Equal>(*signals[0], as_value(is), as_value(PeerState::unheard));
           }};
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What several kinds of condition are made of.
+#include "mauve_rt/run/task.hpp"
+
 #include "conditions/kinds.hpp"
 
 namespace mauve::rules {
@@ -61,7 +63,7 @@ Look Age::look(time_ns_t now_ns) noexcept {
     if (holds != holds_) since_ns_ = std::max(since_ns_, holds ? std::min(now_ns, due_ns) : from_ns);
     holds_ = holds;
     if (!holds) std::swap(low, high);  // whatever comes, it is looked at when it is time
-    return Look{.holds = holds,
+    return Look{.truth = truth_of(holds),
                 .since_ns = since_ns_,
                 .next_ns = holds ? kForever : calm_.next_ns(due_ns),
                 .look_ns = holds ? kForever : calm_.look_ns(due_ns),
@@ -72,6 +74,7 @@ Look Age::look(time_ns_t now_ns) noexcept {
 
 void Side::arm(time_ns_t now_ns) noexcept {
   seen_ = newest();
+  is_known_ = is_known_ || seen_ != 0;
   is_outside_ = begins_outside_;
   if (seen_ % 2 != 0) --seen_;  // it is on the other side now
   since_ns_ = now_ns;
@@ -92,15 +95,25 @@ bool Side::cross() noexcept {
   const time_ns_t time_ns = here.count == seen_ ? here.time_ns : std::min(here.time_ns, there.time_ns);
   since_ns_ = std::max(since_ns_, time_ns);
   value_ = here.value;
+  is_known_ = true;
   return true;
+}
+
+void Side::hear(const Signal::Last& last) noexcept {
+  if (is_known_ || last.count == 0) return;
+  is_known_ = begins_outside_ ? !outer_.contains(last.value) : inner_.contains(last.value);
+  if (is_known_) since_ns_ = std::max(since_ns_, last.time_ns);
 }
 
 Look Range::look(time_ns_t now_ns) noexcept {
   bool crossed = false;
   return look_and_listen(signal_, [&](const Signal::Last& last, double& low, double& high) noexcept {
     crossed = crossed || side_.cross();
+    side_.hear(last);
     const bool again = side_.crosses_again();
-    if (!side_.is_outside()) {
+    if (!side_.is_known()) {
+      // Every value is of interest.
+    } else if (!side_.is_outside()) {
       low = low_;
       high = high_;
     } else if (last.value > high_ - hysteresis_) {
@@ -110,7 +123,7 @@ Look Range::look(time_ns_t now_ns) noexcept {
       low = -kInfinity;
       high = std::nextafter(low_ + hysteresis_, -kInfinity);
     }
-    return Look{.holds = side_.is_outside(),
+    return Look{.truth = side_.truth(true),
                 .since_ns = side_.since_ns(),
                 .next_ns = again ? later_by(now_ns, 1) : kForever,
                 .measured = again ? side_.value() : last.value};
@@ -121,9 +134,10 @@ Look Equal::look(time_ns_t now_ns) noexcept {
   bool crossed = false;
   return look_and_listen(signal_, [&](const Signal::Last& last, double& low, double& high) noexcept {
     crossed = crossed || side_.cross();
+    if (last.value != no_news_) side_.hear(last);
     const bool again = side_.crosses_again();
     if (last.count != 0) low = high = last.value;
-    return Look{.holds = !side_.is_outside(),
+    return Look{.truth = side_.truth(false),
                 .since_ns = side_.since_ns(),
                 .next_ns = again ? later_by(now_ns, 1) : kForever,
                 .measured = again ? side_.value() : last.value};
@@ -153,9 +167,42 @@ Look Often::look(time_ns_t now_ns) noexcept {
     if (holds != holds_) since_ns_ = std::max(since_ns_, holds ? last.time_ns : ends_ns);
     holds_ = holds;
     low = high = last.value;
-    return Look{
-        .holds = holds, .since_ns = since_ns_, .next_ns = holds ? ends_ns : kForever, .measured = last.value};
+    return Look{.truth = truth_of(holds),
+                .since_ns = since_ns_,
+                .next_ns = holds ? ends_ns : kForever,
+                .measured = last.value};
   });
+}
+
+void OfRunning::arm(time_ns_t now_ns) noexcept {
+  part_->arm(now_ns);
+  since_ns_ = now_ns;
+}
+
+Look OfRunning::look(time_ns_t now_ns) noexcept {
+  look_and_listen(state_, [&](const Signal::Last& last, double& low, double& high) noexcept {
+    if (last.count == 0) return Look{};
+    low = high = last.value;
+    const auto state = static_cast<ComponentState>(last.value);
+    const bool runs = state == ComponentState::running || state == ComponentState::stopping;
+    if (runs != std::exchange(runs_, runs)) since_ns_ = std::max(since_ns_, last.time_ns);
+    return Look{};
+  });
+  Look look = part_->look(now_ns);
+  if (look.truth != Truth::no) return look;
+  if (!runs_) look.truth = Truth::unknown;
+  look.since_ns = std::max(look.since_ns, since_ns_);
+  return look;
+}
+
+std::vector<SignalSpec> heard_of_component(const Parameters& parameters, SignalKind kind,
+                                           std::string detail) {
+  const std::string component = text(parameters, "component");
+  return {{kind, component, std::move(detail)}, {SignalKind::state, component}};
+}
+
+std::unique_ptr<Condition> of_running(std::unique_ptr<Condition> part, std::span<Signal* const> signals) {
+  return std::make_unique<OfRunning>(std::move(part), *signals[1]);
 }
 
 std::vector<ParameterSpec> often_parameters(std::vector<ParameterSpec> more) {
@@ -168,8 +215,9 @@ std::vector<ParameterSpec> often_parameters(std::vector<ParameterSpec> more) {
 }
 
 std::unique_ptr<Condition> make_often(const Parameters& parameters, std::span<Signal* const> signals) {
-  return std::make_unique<Often>(*signals[0], told<std::int64_t>(parameters, "at_least"),
-                                 nanoseconds(told<double>(parameters, "within_s")));
+  return of_running(std::make_unique<Often>(*signals[0], told<std::int64_t>(parameters, "at_least"),
+                                            nanoseconds(told<double>(parameters, "within_s"))),
+                    signals);
 }
 
 }  // namespace mauve::rules

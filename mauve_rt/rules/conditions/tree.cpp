@@ -15,7 +15,7 @@ class AtLeast final : public Condition {
       : parts_(std::move(parts)), count_(count) {}
   void arm(time_ns_t now_ns) noexcept override {
     for (const auto& part : parts_) part->arm(now_ns);
-    holds_ = count_ == 0;
+    truth_ = Truth::unknown;
     since_ns_ = cause_ns_ = now_ns;
   }
   void assume() noexcept override {
@@ -23,13 +23,15 @@ class AtLeast final : public Condition {
   }
   Look look(time_ns_t now_ns) noexcept override {
     std::size_t holding = 0;
+    std::size_t unknown = 0;
     Look answer;
     bool is_measured = false;
     time_ns_t latest_ns = since_ns_;
     time_ns_t cause_ns = cause_ns_;
     for (const auto& part : parts_) {
       const Look look = part->look(now_ns);
-      holding += look.holds ? 1 : 0;
+      holding += look.holds() ? 1 : 0;
+      unknown += look.truth == Truth::unknown ? 1 : 0;
       if (look.since_ns >= latest_ns) {
         latest_ns = look.since_ns;
         cause_ns = look.cause_ns();
@@ -37,14 +39,15 @@ class AtLeast final : public Condition {
       answer.next_ns = std::min(answer.next_ns, look.next_ns);
       answer.look_ns = std::min(answer.look_ns, look.look_ns);
       if (!is_measured) answer.measured = look.measured;  // of the first that holds, or else the last
-      is_measured |= look.holds;
+      is_measured |= look.holds();
     }
-    answer.holds = holding >= count_;
-    if (answer.holds != holds_) {  // what changed last has changed it
+    answer.truth = truth_of(holding >= count_);
+    if (!answer.holds() && holding + unknown >= count_) answer.truth = Truth::unknown;
+    if (answer.truth != truth_) {  // what changed last has changed it
       since_ns_ = latest_ns;
       cause_ns_ = cause_ns;
     }
-    holds_ = answer.holds;
+    truth_ = answer.truth;
     answer.since_ns = since_ns_;
     answer.sample_ns = cause_ns_;
     return answer;
@@ -53,7 +56,7 @@ class AtLeast final : public Condition {
  private:
   const std::vector<std::unique_ptr<Condition>> parts_;
   const std::size_t count_;
-  bool holds_{false};
+  Truth truth_{Truth::unknown};
   time_ns_t since_ns_{0};
   time_ns_t cause_ns_{0};
 };
@@ -65,7 +68,7 @@ class Not final : public Condition {
   // What would make this one hold cannot be assumed of the part: it is seen.
   Look look(time_ns_t now_ns) noexcept override {
     Look look = part_->look(now_ns);
-    look.holds = !look.holds;
+    if (look.truth != Truth::unknown) look.truth = truth_of(!look.holds());
     return look;
   }
 
@@ -73,13 +76,13 @@ class Not final : public Condition {
   const std::unique_ptr<Condition> part_;
 };
 
-/// Holds while its part has held for so long without a break.
+/// Holds while its part has held for so long without a break. Until then it is as it was before the part held.
 class For final : public Condition {
  public:
   For(std::unique_ptr<Condition> part, time_ns_t for_ns) : part_(std::move(part)), for_ns_(for_ns) {}
   void arm(time_ns_t now_ns) noexcept override {
     part_->arm(now_ns);
-    ended_ns_ = now_ns;
+    before_ = {.truth = Truth::unknown, .since_ns = now_ns};
     is_assumed_ = false;
   }
   void assume() noexcept override {
@@ -88,10 +91,9 @@ class For final : public Condition {
   }
   Look look(time_ns_t now_ns) noexcept override {
     Look look = part_->look(now_ns);
-    if (!look.holds) {
-      is_assumed_ = false;
-      ended_ns_ = look.since_ns;
-      return look;
+    if (!look.holds()) {
+      if (look.truth == Truth::no) is_assumed_ = false;
+      return before_ = look;
     }
     const time_ns_t due_ns = later_by(look.since_ns, for_ns_);
     if (is_assumed_ || now_ns >= due_ns) {
@@ -99,7 +101,8 @@ class For final : public Condition {
       if (!is_assumed_) look.since_ns = due_ns;
       return look;
     }
-    return {.since_ns = ended_ns_,
+    return {.truth = before_.truth,
+            .since_ns = before_.since_ns,
             .next_ns = std::min(look.next_ns, due_ns),
             .look_ns = look.look_ns,
             .measured = look.measured};
@@ -108,7 +111,7 @@ class For final : public Condition {
  private:
   const std::unique_ptr<Condition> part_;
   const time_ns_t for_ns_;
-  time_ns_t ended_ns_{0};
+  Look before_{};
   bool is_assumed_{false};
 };
 
@@ -119,38 +122,33 @@ class Within final : public Condition {
       : part_(std::move(part)), within_ns_(within_ns) {}
   void arm(time_ns_t now_ns) noexcept override {
     part_->arm(now_ns);
-    held_ = was_held_ = false;
+    did_part_hold_ = false;
+    truth_ = Truth::unknown;
     since_ns_ = cause_ns_ = now_ns;
   }
   void assume() noexcept override { part_->assume(); }
   Look look(time_ns_t now_ns) noexcept override {
     Look look = part_->look(now_ns);
-    if (look.holds) {
-      if (!held_) {
+    if (look.holds()) {
+      if (truth_ != Truth::yes) {
         since_ns_ = look.since_ns;
         cause_ns_ = look.cause_ns();
       }
-      held_ = was_held_ = true;
-      return {.holds = true,
-              .since_ns = since_ns_,
-              .next_ns = look.next_ns,
-              .look_ns = look.look_ns,
-              .measured = look.measured,
-              .sample_ns = cause_ns_};
+      did_part_hold_ = true;
+    } else {
+      if (std::exchange(did_part_hold_, false)) ends_ns_ = later_by(look.since_ns, within_ns_);
+      if (truth_ == Truth::yes && now_ns < ends_ns_) {
+        look.truth = Truth::yes;
+        look.next_ns = std::min(look.next_ns, ends_ns_);
+      } else if (truth_ == Truth::yes) {
+        since_ns_ = ends_ns_;
+        cause_ns_ = ends_ns_ - within_ns_;
+      } else if (truth_ != look.truth) {
+        since_ns_ = std::max(since_ns_, look.since_ns);
+        cause_ns_ = std::max(cause_ns_, look.cause_ns());
+      }
     }
-    if (std::exchange(was_held_, false)) ends_ns_ = later_by(look.since_ns, within_ns_);
-    if (held_ && now_ns < ends_ns_) {
-      return {.holds = true,
-              .since_ns = since_ns_,
-              .next_ns = std::min(look.next_ns, ends_ns_),
-              .look_ns = look.look_ns,
-              .measured = look.measured,
-              .sample_ns = cause_ns_};
-    }
-    if (std::exchange(held_, false)) {
-      since_ns_ = ends_ns_;
-      cause_ns_ = ends_ns_ - within_ns_;
-    }
+    truth_ = look.truth;
     look.since_ns = since_ns_;
     look.sample_ns = cause_ns_;
     return look;
@@ -159,8 +157,8 @@ class Within final : public Condition {
  private:
   const std::unique_ptr<Condition> part_;
   const time_ns_t within_ns_;
-  bool was_held_{false};  // the part, at the look before
-  bool held_{false};      // this one
+  bool did_part_hold_{false};    // at the look before
+  Truth truth_{Truth::unknown};  // this one, at the look before
   time_ns_t ends_ns_{0};
   time_ns_t since_ns_{0};
   time_ns_t cause_ns_{0};

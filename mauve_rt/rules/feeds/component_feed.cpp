@@ -35,11 +35,24 @@ void ComponentFeed::add(Befalls what, Signal& signal, time_ns_t bound_ns) {
   listen(std::move(component));
 }
 
+void ComponentFeed::remove(const Signal& signal) {
+  const auto is_it = [&](const Told& told) { return told.signal == &signal; };
+  if (std::none_of(told_.begin(), told_.end(), is_it)) return;
+  std::shared_ptr<Component> component = component_;
+  let_go();
+  std::erase_if(told_, is_it);
+  if (component != nullptr) listen(std::move(component));
+}
+
 void ComponentFeed::follow() {
   std::shared_ptr<Component> present = architecture_.find_component(name_);
   if (present != component_) {
     let_go();
-    if (present != nullptr) listen(std::move(present));
+    if (present != nullptr) {
+      listen(std::move(present));
+    } else {
+      on_state(clock_.now_ns(), ComponentState::unconfigured);  // there is none that runs
+    }
   }
   if (component_ == nullptr) return;
   Task& task = component_->task();

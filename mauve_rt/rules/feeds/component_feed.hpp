@@ -33,6 +33,9 @@ class ComponentFeed final : public Feed, private TaskListener {
   /// `bound_ns`: what counts as late. [setup]
   /// Throws Error (out_of_range): another one listens to the component, or it has no period that a release could miss.
   void add(Befalls what, Signal& signal, time_ns_t bound_ns = 0);
+  /// It is told nothing any more. [non-rt]
+  void remove(const Signal& signal);
+  bool hears_anything() const noexcept { return !told_.empty(); }
   void follow() override;
 
  private:

@@ -42,20 +42,20 @@ Feeds::~Feeds() = default;
 void Feeds::open(const SignalSpec& spec, Signal& signal) {
   switch (spec.kind) {
     case SignalKind::message:
-      feeds_.push_back(open_write_feed(resource_of(spec.target), signal, place_));
+      feeds_[&signal] = open_write_feed(resource_of(spec.target), signal, place_);
       return;
     case SignalKind::write:
-      feeds_.push_back(open_write_feed(spec.target, signal, place_));
+      feeds_[&signal] = open_write_feed(spec.target, signal, place_);
       return;
     case SignalKind::field: {
       const auto topic = place_.topics.find(spec.target);
       const std::string& resource = topic != place_.topics.end() ? topic->second : spec.target;
-      feeds_.push_back(open_field_feed(resource, spec.detail, signal, place_));
+      feeds_[&signal] = open_field_feed(resource, spec.detail, signal, place_);
       return;
     }
     case SignalKind::change:
       if (spec.target.empty()) {
-        feeds_.push_back(open_change_feed(signal, place_));
+        feeds_[&signal] = open_change_feed(signal, place_);
         return;
       }
       break;
@@ -77,12 +77,10 @@ void Feeds::open(const SignalSpec& spec, Signal& signal) {
 }
 
 void Feeds::open_component(const SignalSpec& spec, Signal& signal) {
-  ComponentFeed*& feed = components_[spec.target];
-  if (feed == nullptr) {
-    auto opened = std::make_unique<ComponentFeed>(spec.target, place_);
-    feed = opened.get();
-    feeds_.push_back(std::move(opened));
-  }
+  auto found = components_.find(spec.target);
+  if (found == components_.end())
+    found = components_.emplace(spec.target, std::make_unique<ComponentFeed>(spec.target, place_)).first;
+  ComponentFeed* const feed = found->second.get();
   switch (spec.kind) {
     case SignalKind::overruns:
       return feed->add(Befalls::overrun, signal);
@@ -115,8 +113,16 @@ void Feeds::beat() noexcept {
   for (Signal* signal : node_) signal->tell(place_.clock.now_ns());
 }
 
+void Feeds::close(const Signal& signal) {
+  feeds_.erase(&signal);
+  std::erase(node_, &signal);
+  for (const auto& [name, feed] : components_) feed->remove(signal);
+  std::erase_if(components_, [](const auto& each) { return !each.second->hears_anything(); });
+}
+
 void Feeds::follow() {
-  for (const auto& feed : feeds_) feed->follow();
+  for (const auto& [signal, feed] : feeds_) feed->follow();
+  for (const auto& [name, feed] : components_) feed->follow();
 }
 
 }  // namespace mauve::rules

@@ -7,7 +7,7 @@ namespace mauve::rules {
 
 namespace {
 
-/// One number of the newest value of a resource, at each write to it.
+/// One number of the newest value of a resource: what is there now, and then each write.
 ///
 /// | member             | written by       | read by | under                                       |
 /// | ------------------ | ---------------- | ------- | ------------------------------------------- |
@@ -33,7 +33,8 @@ class FieldFeed final : public Feed, private EventListener {
   }
 
  private:
-  void on_event(time_ns_t /*written_ns*/) noexcept override {
+  void on_event(time_ns_t /*written_ns*/) noexcept override { tell_present(); }
+  void tell_present() noexcept {
     double number = 0;
     if (resource_->read_number(place_, number)) signal_.tell(clock_.now_ns(), number);
   }
@@ -52,6 +53,8 @@ class FieldFeed final : public Feed, private EventListener {
     place_ = *found;
     resource_ = std::move(resource);
     resource_->listen(*this);
+    const LockGuard lock(resource_->events_mutex());  // else a write tells the signal at the same time
+    tell_present();
   }
   void let_go() noexcept {
     if (resource_ != nullptr) resource_->unlisten(*this);

@@ -29,6 +29,7 @@ TOLD_AS: Mapping[str, tuple[str, str]] = {
     "adopted": ("adopted", ""),
     "condition true": ("condition_true", ""),
     "condition false": ("condition_false", ""),
+    "condition unknown": ("condition_unknown", ""),
     "do": ("do", ""),
     "undo": ("undo", ""),
     "done": ("done", "do"),

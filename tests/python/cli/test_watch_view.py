@@ -91,12 +91,14 @@ def test_rules_and_values_of_several_tell_whose_they_are() -> None:
 
 
 def test_rules_values_and_the_last_change() -> None:
-    rule = RuleInfo(name="lost", armed=True, holds=True, next="do", next_in_s=0.8, since_s=2.0)
+    rule = RuleInfo(name="lost", armed=True, holds=True, known=True, next="do", next_in_s=0.8, since_s=2.0)
+    unknown = RuleInfo(name="stop", armed=True, since_s=2.0)
     other = RuleInfo(name="idle")
     values = {"pose:x": Followed(text="x 1.5", age_ns=2_000_000, writes=4, numbers=deque([1.0, 2.0, 0.0]))}
     event = ReconfigurationEvent(request="replace_core guidance", requested_by="mauve", success=True)
-    text = "\n".join(shown(known(rules=[rule, other], values=values, last_event=event)))
+    text = "\n".join(shown(known(rules=[rule, unknown, other], values=values, last_event=event)))
     assert "rule lost  true for 2 s, do in 0.8 s" in text
+    assert "rule stop  unknown for 2 s" in text
     assert "rule idle  not armed" in text
     assert [*next(line for line in text.splitlines() if "pose:x" in line).split()] == [
         *("pose:x", "x", "1.5", "▅█▁", "2", "ms")

@@ -36,7 +36,7 @@ def test_every_kind_can_be_told_something() -> None:
 def test_what_is_told(tmp_path: Path, leaf: str, said: dict[str, object], values: list[float]) -> None:
     told = Heard(**said)
     (condition,) = load(tmp_path, leaf).rules.rules[0].when.leaves()
-    (signal,) = heard(condition)
+    signal, *_ = heard(condition)
     assert told.tells(signal)
     assert [value for _, value in told.samples(2.0)] == values
     assert not Heard(topic="another").tells(signal)

@@ -14,6 +14,8 @@ from typing import Any
 
 import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from lifecycle_msgs.msg import Transition
+from lifecycle_msgs.srv import ChangeState
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
@@ -230,16 +232,78 @@ def test_acts_without_its_supervisor(start: Start, files: tuple[Path, Path], dom
 
 
 def test_takes_up_what_is_in_effect(start: Start, graph: Any, files: tuple[Path, Path]):
-    """Loaded anew while degraded: what the rule did is its own, and undone when it is time."""
+    """Loaded anew while degraded: the same rule goes on; another one of the name takes up what is done."""
     robot = start()
     robot.await_said("armed")
     robot.voice.off()
-    robot.await_said("done")
+    robot.await_end("do")
     reply = graph.ask(LoadRules, f"{NODE}/load_rules", path="")
     assert (reply.success, reply.message) == (True, "rules at work: 1")
+    robot.await_said("armed", 2)
+    assert [each.in_effect for each in graph.ask(ListRules, f"{NODE}/list_rules").rules] == [True]
+    assert "adopted" not in robot.said()
+    files[1].write_text(RULES.replace(f"for_s: {UNDO_S}", "for_s: 0.4"), encoding="utf-8")
+    assert graph.ask(LoadRules, f"{NODE}/load_rules", path="").success
     robot.await_said("adopted")
     robot.voice.on()
     robot.await_core(USUAL)
+
+
+SILENCE = f"{{silence: {{topic: beat, longer_than_s: {SILENCE_S}}}}}"
+STOP = RULES.replace(SILENCE, "{value: {topic: beat, field: data, above: 0.5}}")
+
+
+def pressed(robot: Robot, graph: Any) -> Callable[[float], None]:
+    """A stop is pressed by a value that is published once; the function publishes another one."""
+    robot.await_said("armed")
+    robot.voice.off()
+    publisher = graph.voice(Float64, "/robot_1/beat")
+    graph.spin_until(lambda: publisher.get_subscription_count() > 0, "the executor to listen")
+    time.sleep(0.1)  # the voice has spoken its last
+    publisher.publish(Float64(data=1.0))
+    robot.await_core(SAFE)
+    return lambda value: publisher.publish(Float64(data=value))
+
+
+def stays_pressed(robot: Robot, graph: Any) -> bool:
+    until_s = time.monotonic() + 3 * UNDO_S
+    graph.spin_until(lambda: time.monotonic() > until_s, "the time after which it would be undone")
+    return robot.core() == SAFE and "undo" not in robot.said()
+
+
+def test_a_stop_that_lasts_is_not_undone_by_new_rules_or_activations(
+    start: Start, graph: Any, files: tuple[Path, Path]
+):
+    files[1].write_text(STOP, encoding="utf-8")
+    robot = start()
+    press = pressed(robot, graph)
+    for for_s in (UNDO_S, UNDO_S, 0.2):  # the same rule, and another one of its name
+        files[1].write_text(STOP.replace(f"for_s: {UNDO_S}", f"for_s: {for_s}"), encoding="utf-8")
+        assert graph.ask(LoadRules, f"{NODE}/load_rules", path="").success
+        assert stays_pressed(robot, graph)
+    for transition in (Transition.TRANSITION_DEACTIVATE, Transition.TRANSITION_ACTIVATE):
+        change = Transition(id=transition)
+        assert graph.ask(ChangeState, f"{NODE}/change_state", transition=change).success
+    robot.await_said("armed", 5)
+    assert stays_pressed(robot, graph)
+    press(0.0)
+    robot.await_core(USUAL)
+
+
+def test_a_stop_that_is_pressed_while_rules_are_loaded_is_not_lost(
+    start: Start, graph: Any, files: tuple[Path, Path]
+):
+    files[1].write_text(STOP, encoding="utf-8")
+    robot = start()
+    press = pressed(robot, graph)
+    for offset_s in (0.0, 0.005, 0.01, 0.02, 0.03):
+        press(0.0)
+        robot.await_core(USUAL)
+        reply = graph.ask_later(LoadRules, f"{NODE}/load_rules", path="")
+        time.sleep(offset_s)
+        press(1.0)
+        graph.spin_until(reply.done, "the reply")
+        robot.await_core(SAFE)
 
 
 def test_leaves_alone_what_an_operator_did(start: Start, graph: Any, files: tuple[Path, Path]):

@@ -16,7 +16,7 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from std_msgs.msg import Float64
+from std_msgs.msg import Bool, Float64
 
 from mauve_msgs.msg import ArchitectureState, SupervisorDecision
 from mauve_rt.parts.ament_index import share_folder
@@ -189,6 +189,40 @@ def test_an_executor_started_anew_while_degraded_is_as_its_file_says(band: Band)
     band.until(lambda: band.core() == "mauve_examples/Accelerando")
     assert band.said().count("adopted") == 1
     assert "undo" not in band.said()
+
+
+STOP = RULES.replace(
+    "{silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 2.0}}",
+    "{boolean: {topic: stop}}\n    in: supervisor",
+)
+
+
+@pytest.mark.parametrize(
+    ("durability", "known"),
+    [
+        (DurabilityPolicy.TRANSIENT_LOCAL, "condition_true"),
+        (DurabilityPolicy.VOLATILE, "condition_unknown"),
+    ],
+)
+def test_a_stop_that_lasts_outlives_its_supervisor(band: Band, durability: Any, known: str):
+    """Its writer keeps the last message for who comes later; or it does not, and nobody knows."""
+
+    def start() -> None:
+        band.kill_supervisor()
+        band.decisions.clear()
+        band.start_supervisor(STOP)
+
+    stop = band.node.create_publisher(Bool, "/band/stop", QoSProfile(depth=1, durability=durability))
+    start()
+    band.until(lambda: "armed" in band.said())
+    band.until(lambda: stop.publish(Bool(data=True)) or "done" in band.said())
+    start()
+    band.until(lambda: known in band.said())
+    until_s = time.monotonic() + 1.5  # it would undo after 0.5
+    band.until(lambda: time.monotonic() > until_s)
+    assert "undo" not in band.said()
+    assert band.core() == "mauve_examples/Accelerando"
+    band.until(lambda: stop.publish(Bool(data=False)) or band.said()[-2:] == ["undo", "done"])
 
 
 def test_rules_that_the_executor_would_refuse_are_told_at_arming(band: Band):

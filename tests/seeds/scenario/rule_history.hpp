@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <optional>
 #include <string>
@@ -43,17 +44,7 @@ class RuleHistory {
               seeds::Findings& findings)
       : rules_(rules), beats_(beats), findings_(findings) {}
 
-  void add(std::vector<rules::Told> told) {
-    for (rules::Told& one : told) {
-      if (one.decision.decided == rules::Decided::armed) armed_ns_[one.decision.rule] = one.decision.stamp_ns;
-      all_.push_back(std::move(one));
-    }
-  }
-  /// When the rule was armed last, so far as it was told.
-  time_ns_t armed_ns(int rule) const {
-    const auto found = armed_ns_.find(rule);
-    return found != armed_ns_.end() ? found->second : kForever;
-  }
+  void add(std::vector<rules::Told> told) { std::ranges::move(told, std::back_inserter(all_)); }
   /// `lost`: of the runner, which was stopped at that instant.
   void check(std::uint64_t lost, time_ns_t stopped_ns) {
     std::ranges::stable_sort(all_, {}, &rules::Told::number);
@@ -151,25 +142,22 @@ class RuleHistory {
     expect(decision.cause_ns == 0 || decision.stamp_ns - decision.cause_ns >= dwell_ns,
            what + "after " + std::to_string(decision.stamp_ns - decision.cause_ns) + " ns, expected " +
                std::to_string(dwell_ns));
-    // Armed anew, a value is not known before it is written again: the condition does not hold, negated it does.
-    if (known.is_negated || !does) return;
     const std::vector<Beat>& beats = beats_[known.beat];
     const time_ns_t slack_ns = kSeen + seeds::outcome().stalled_ns;
     bool was_so = false;
     for (std::size_t i = 0; i < beats.size(); ++i) {
       const time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns + slack_ns : kForever;
-      was_so = was_so || (known.holds(beats[i].value) && beats[i].began_ns <= decision.stamp_ns &&
+      was_so = was_so || (known.holds(beats[i].value) == does && beats[i].began_ns <= decision.stamp_ns &&
                           decision.stamp_ns <= end_ns);
     }
-    expect(was_so || beats.empty(), what + "its condition was not so, stamp " +
-                                        std::to_string(decision.stamp_ns / 1000 - 1'000'000'000));
+    expect(was_so, what + "its condition was not so, stamp " +
+                       std::to_string(decision.stamp_ns / 1000 - 1'000'000'000));
   }
 
   const std::vector<KnownRule>& rules_;
   std::map<std::string, std::vector<Beat>>& beats_;
   seeds::Findings& findings_;
   std::vector<rules::Told> all_;
-  std::map<int, time_ns_t> armed_ns_;
 };
 
 }  // namespace mauve::testing

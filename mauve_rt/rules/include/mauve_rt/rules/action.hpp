@@ -23,6 +23,8 @@ struct ActionStep {
   std::string target{};
   std::string name{};
   std::optional<PropertyValue> value{};
+
+  bool operator==(const ActionStep&) const = default;
 };
 using ActionSteps = std::vector<ActionStep>;
 

@@ -17,15 +17,22 @@
 
 namespace mauve::rules {
 
+/// Kleene's three values. What nothing was received of is unknown: no reason to act, and none to undo.
+enum class Truth : std::uint8_t { no, yes, unknown };
+/// [rt]
+constexpr Truth truth_of(bool holds) MAUVE_RT { return holds ? Truth::yes : Truth::no; }
+
 /// What a condition says at one instant.
 struct Look {
-  bool holds{false};
+  Truth truth{Truth::no};
   time_ns_t since_ns{0};        // the instant from which on it has been so
   time_ns_t next_ns{kForever};  // the first instant at which it can be otherwise though nothing is told
   time_ns_t look_ns{kForever};  // when to look again before that, though it is as it is then, too
   double measured{0.0};         // what it looks at: s of silence, a value, how many
   std::optional<time_ns_t> sample_ns{};  // the last sample before a silence; empty: since_ns
 
+  /// [rt]
+  bool holds() const MAUVE_RT { return truth == Truth::yes; }
   /// When that happened which made it so: the last sample before a silence, the first one beyond a bound. [rt]
   time_ns_t cause_ns() const MAUVE_RT { return sample_ns.value_or(since_ns); }
 };
@@ -85,6 +92,8 @@ struct When {
   std::int64_t count{0};      // of at_least
   time_ns_t for_ns{0};        // it has to have held so long without a break
   time_ns_t within_ns{0};     // it need have held (so long) only at some instant of the last so many
+
+  bool operator==(const When&) const = default;
 };
 
 /// Gives a condition a signal: one of its own, since it listens to it in its own way. [setup]

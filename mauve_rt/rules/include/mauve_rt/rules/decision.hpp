@@ -28,12 +28,13 @@ enum class Decided : std::uint8_t {
   adopted,   // what it does was in effect when it was armed: it is undone when it is time
   condition_true,
   condition_false,
-  do_,         // it begins what it does
-  undo,        // it begins to undo that
-  otherwise,   // it begins its reserve action
-  done,        // what was begun is in effect
-  failed,      // it is not; it is tried again after wait_ns
-  suppressed,  // it wants something, and that is not begun: why, says Why
+  condition_unknown,  // nothing more is known of what it is about: what is in effect stays so
+  do_,                // it begins what it does
+  undo,               // it begins to undo that
+  otherwise,          // it begins its reserve action
+  done,               // what was begun is in effect
+  failed,             // it is not; it is tried again after wait_ns
+  suppressed,         // it wants something, and that is not begun: why, says Why
 };
 
 enum class Why : std::uint8_t {

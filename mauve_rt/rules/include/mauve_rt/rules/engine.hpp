@@ -31,6 +31,8 @@ struct Rule {
   std::optional<time_ns_t>
       otherwise_after_ns{};  // so long after `do` is due, and not in effect: its reserve action
   bool takes_over{false};    // what it does counts as its own, and is undone, also where somebody else did it
+
+  bool operator==(const Rule&) const = default;
 };
 
 /// What the engine wants done now.
@@ -47,18 +49,23 @@ enum class Ended : std::uint8_t { done, refused, stale, withdrawn, timed_out };
 /// How one rule fares.
 struct RuleStatus {
   bool armed{false};
-  bool holds{false};
+  Truth truth{Truth::unknown};
   bool in_effect{false};
   bool changed_by_another{false};
   time_ns_t since_ns{0};  // the condition has been as it is
   double measured{0.0};
   std::optional<Act> next{};    // what it is going to want if nothing changes
   time_ns_t next_ns{kForever};  // when
+
+  /// [rt]
+  bool holds() const MAUVE_RT { return truth == Truth::yes; }
 };
 
 /// The rules of one architecture: no thread in it, no clock, and nothing allocated after it was made.
 ///
 /// A rule does (`do`) once its condition has held for `for_ns`, and undoes (`undo`) once it has not held for `undo_for_ns`.
+/// While the condition is unknown it begins neither: what was due is still done, what is in effect stays. Both times count
+/// anew from the end of that.
 /// It never fights a person: what it wants and finds already done is not done again, and what somebody changes while it is
 /// in effect stays as it is until the condition ends. Actions of rules about different components are under way side by
 /// side. Of rules about the same component one action at a time is: a rule of higher rank has that of a lower one called off.
@@ -69,15 +76,16 @@ struct RuleStatus {
 /// | member       | written by          | read by             | order                                                     |
 /// | ------------ | ------------------- | ------------------- | --------------------------------------------------------- |
 /// | signals_     | who feeds them      | decision thread     | their own: signal.hpp                                     |
-/// | word_ (futex)| signals, wake()     | decision thread     | release/acquire: who sees it changed sees why             |
+/// | word_ (futex)| signals, wake()     | decision thread     | release/acquire: who sees it changed sees why; engines    |
+/// |              |                     |                     | of which one goes on from the other share it              |
 /// | told_, ring_ | decision thread     | who takes decisions | release/acquire: a decision is whole before it is counted |
 /// | taken_       | who takes decisions | decision thread     | release/acquire: its place may be written again           |
 /// | lost_        | decision thread     | anyone              | relaxed: a lone count                                     |
 /// | the rest     | decision thread     | decision thread     | -                                                         |
 class Engine {
  public:
-  /// [setup] Throws Error: a rule that cannot be so.
-  explicit Engine(std::vector<Rule> rules);
+  /// `before`: some of whose rules go_on() will let go on. [setup] Throws Error: a rule that cannot be so.
+  explicit Engine(std::vector<Rule> rules, const Engine* before = nullptr);
   ~Engine();
   Engine(const Engine&) = delete;
   Engine& operator=(const Engine&) = delete;
@@ -87,13 +95,22 @@ class Engine {
   struct Heard {
     SignalSpec spec;
     Signal* signal;
+    std::size_t rule;
   };
   /// One for each condition that listens, in the order of the rules. [non-rt]
   const std::vector<Heard>& signals() const noexcept { return heard_; }
   /// Bumped by what is of interest. [rt]
-  const Atomic<std::uint32_t>& word() const MAUVE_RT { return word_; }
+  const Atomic<std::uint32_t>& word() const MAUVE_RT { return word_->value; }
   /// Lets the decision thread look. Any thread. [rt]
   void wake() MAUVE_RT;
+
+  // ---- one engine after another, neither of which decides at that time
+
+  /// The number of the same rule; nothing: there is none. [non-rt]
+  std::optional<std::size_t> find(const Rule& rule) const noexcept;
+  /// The rule goes on as one of `before`, which is the same: what its signals have told, and tell until this engine decides,
+  /// counts. `stays_armed`: else it is armed anew. That of `before` is as new afterwards. [non-rt]
+  void go_on(std::size_t rule, Engine& before, std::size_t rule_before, bool stays_armed) noexcept;
 
   // ---- the decision thread: what it finds of the architecture
 
@@ -171,7 +188,7 @@ class Engine {
   std::vector<Life*> by_rank_;  // the highest first
   std::optional<PendingAction> pending_;
   std::array<Decision, kRing> ring_{};
-  alignas(64) Atomic<std::uint32_t> word_{0};
+  const std::shared_ptr<EngineWord> word_;
   alignas(64) Atomic<std::uint64_t> told_{0};
   alignas(64) Atomic<std::uint64_t> taken_{0};
   Atomic<std::uint64_t> lost_{0};

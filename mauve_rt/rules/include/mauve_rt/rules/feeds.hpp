@@ -5,6 +5,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/architecture/architecture.hpp"
@@ -46,6 +47,10 @@ class Feeds {
   /// Lets the signal hear what it is declared to hear, from now on. [setup]
   /// Throws Error: that is not there, or cannot be heard in an executor.
   void open(const SignalSpec& spec, Signal& signal);
+  /// The signal hears nothing any more afterwards. [non-rt]
+  void close(const Signal& signal);
+  /// From now on these topics are meant. [non-rt]
+  void set_topics(std::map<std::string, std::string> topics) { place_.topics = std::move(topics); }
   /// As Feed's, of all of them. [non-rt], one thread
   void follow();
   /// The executor's Python side works. [rt], one thread
@@ -56,9 +61,9 @@ class Feeds {
   const std::string& resource_of(const std::string& topic) const;
 
   FeedPlace place_;
-  std::vector<std::unique_ptr<Feed>> feeds_;
+  std::map<const Signal*, std::unique_ptr<Feed>> feeds_;  // of a signal each
+  std::map<std::string, std::unique_ptr<ComponentFeed>> components_;
   std::vector<Signal*> node_;
-  std::map<std::string, ComponentFeed*> components_;  // of feeds_
 };
 
 }  // namespace mauve::rules

@@ -75,10 +75,12 @@ struct RuleFacts {
 /// | told_ ... woken_, unobservable_ | follower, wake() | anyone | told_mutex_                                          |
 class RuleRunner {
  public:
-  /// `actions`: of the engine's rules, in their order. `topics`: topic -> the resource that is bound to it. [setup]
-  /// Throws Error as Feeds::open(); invalid_argument: a kind of step that there is not.
-  RuleRunner(Host& host, std::unique_ptr<Engine> engine, const std::vector<RuleActions>& actions,
-             std::map<std::string, std::string> topics = {});
+  /// `actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it. `before`: those of the same
+  /// host whose place these rules take, stopped: a rule that is in both, and the same, goes on, and what it hears in between
+  /// counts. It is of no use afterwards, and as it was where this throws. [setup]
+  /// Throws Error as Feeds::open(); invalid_argument: a rule that cannot be so, a kind of step that there is not.
+  RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, const std::vector<RuleActions>& actions,
+             std::map<std::string, std::string> topics = {}, RuleRunner* before = nullptr);
   /// As stop().
   ~RuleRunner();
   RuleRunner(const RuleRunner&) = delete;
@@ -96,7 +98,7 @@ class RuleRunner {
   /// [non-rt]
   std::vector<RuleFacts> facts() const;
   /// The executor's Python side works: conditions node_silent receive that. [rt], one thread. In virtual time advance() does it.
-  void beat() MAUVE_RT { feeds_.beat(); }
+  void beat() MAUVE_RT { feeds_->beat(); }
   /// How many decisions were left out, because those before them were not taken in time. [non-rt]
   std::uint64_t lost() const;
 
@@ -157,6 +159,7 @@ class RuleRunner {
   std::uint64_t collect();
   void tell();
   std::string follow();
+  std::optional<std::size_t> find(const RuleRunner& other, std::size_t rule) const;
   void start_thread(Thread& thread, const ThreadSettings& settings, void* (*entry)(void*));
   void start_workers();
   void join_workers() noexcept;
@@ -166,13 +169,14 @@ class RuleRunner {
   const Clock& clock_;
   std::unique_ptr<Engine> engine_;
   std::vector<std::unique_ptr<Rule>> rules_;
-  Feeds feeds_;
+  std::shared_ptr<Feeds> feeds_;
   ChangeSignal work_;
   Atomic<std::uint32_t> ending_{0};
   Thread decision_thread_;
   Thread follower_;
   std::uint64_t made_{0};      // the follower's: how many decisions
   std::uint64_t followed_{0};  // the follower's: the revision at which preparation threads were asked
+  time_ns_t epoch_ns_{0};      // of the deployment that it was started in
   bool runs_{false};
   mutable PiMutex status_mutex_;
   mutable Mutex told_mutex_;

@@ -5,7 +5,9 @@
 #include <compare>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <string>
+#include <utility>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
@@ -33,6 +35,17 @@ enum class SignalKind : std::uint8_t {
 
 /// What is known of another executor.
 enum class PeerState : std::uint8_t { unheard, there, another_instance, faulted, gone };
+
+/// Changes with all that is of interest to an engine (futex); engines of which one follows the other have one.
+struct alignas(64) EngineWord {
+  Atomic<std::uint32_t> value{0};
+
+  /// Changes it, and wakes who sleeps on it. [rt]
+  void bump() MAUVE_RT {
+    value.fetch_add(1, std::memory_order_release);
+    futex_wake_all(value);
+  }
+};
 
 /// Names one signal.
 struct SignalSpec {
@@ -75,8 +88,8 @@ class Signal {
     bool contains(double value) const MAUVE_RT { return value >= low && value <= high; }
   };
 
-  /// `word` is bumped, and who sleeps on it woken, by what is of interest; it outlives the signal. [setup]
-  explicit Signal(Atomic<std::uint32_t>& word) : word_(word) {}
+  /// `word` is bumped by what is of interest. [setup]
+  explicit Signal(std::shared_ptr<EngineWord> word) : word_(std::move(word)) {}
   Signal(const Signal&) = delete;
   Signal& operator=(const Signal&) = delete;
 
@@ -135,7 +148,7 @@ class Signal {
     Place places_[2];  // NOLINT(modernize-avoid-c-arrays): atomics, which std::array would have to copy
   };
 
-  Atomic<std::uint32_t>& word_;
+  const std::shared_ptr<EngineWord> word_;
   Record all_, entered_, left_;
   Bounds inner_, outer_;
   bool counts_crossings_{false};
