@@ -16,18 +16,15 @@ constexpr auto kSignalNames =
 constexpr auto kEndings =
     std::to_array<std::string_view>({"done", "refused", "stale", "withdrawn", "timed_out"});
 
-constexpr auto kActNames = std::to_array<std::string_view>({"do", "undo", "otherwise"});
-
-std::string_view name_of_act(rules::Act act) { return kActNames[rules::index_of(act)]; }
-
 [[noreturn]] void refuse_name(const char* what, const std::string& expected, const std::string& found) {
   throw Error(ErrorCode::invalid_argument, what, {.expected = expected, .found = found});
 }
 
 rules::Act act_of(const std::string& name) {
-  const auto* const found = std::find(kActNames.begin(), kActNames.end(), name);
-  if (found == kActNames.end()) refuse_name("there is no such act", "do, undo or otherwise", name);
-  return static_cast<rules::Act>(found - kActNames.begin());
+  for (const rules::Act act : {rules::Act::do_, rules::Act::undo, rules::Act::otherwise}) {
+    if (rules::name_of(act) == name) return act;
+  }
+  refuse_name("there is no such act", "do, undo or otherwise", name);
 }
 
 rules::Ended ended_of(const std::string& name) {
@@ -116,7 +113,7 @@ void bind_answers(py::module_& module) {
       module, "PendingAction",
       "What an engine wants done now: do, undo or otherwise. cause_ns: since when its condition is so.")
       .def_readonly("rule", &rules::PendingAction::rule)
-      .def_property_readonly("act", [](const rules::PendingAction& self) { return name_of_act(self.act); })
+      .def_property_readonly("act", [](const rules::PendingAction& self) { return rules::name_of(self.act); })
       .def_readonly("cause_ns", &rules::PendingAction::cause_ns)
       .def_readonly("measured", &rules::PendingAction::measured);
   py::class_<rules::Decision>(
@@ -126,7 +123,7 @@ void bind_answers(py::module_& module) {
       .def_readonly("rule", &rules::Decision::rule)
       .def_property_readonly("decision",
                              [](const rules::Decision& self) { return rules::name_of(self.decided); })
-      .def_property_readonly("act", [](const rules::Decision& self) { return name_of_act(self.act); })
+      .def_property_readonly("act", [](const rules::Decision& self) { return rules::name_of(self.act); })
       .def_property_readonly("why", [](const rules::Decision& self) { return rules::words_of(self.why); })
       .def_property_readonly(
           "other",
@@ -138,6 +135,9 @@ void bind_answers(py::module_& module) {
       .def_readonly("sample_ns", &rules::Decision::sample_ns,
                     "What made it so: the last sample before a silence, the first one beyond a bound.")
       .def_readonly("wait_ns", &rules::Decision::wait_ns)
+      .def_readonly(
+          "held_ns", &rules::Decision::held_ns,
+          "Of done and failed: for so long a higher rule or its cooldown held it back when it was due.")
       .def_readonly("measured", &rules::Decision::measured);
   py::class_<rules::RuleStatus>(module, "RuleStatus",
                                 "How one rule fares. next: 'do' or 'undo' if nothing changes, and when.")
@@ -153,7 +153,7 @@ void bind_answers(py::module_& module) {
       .def_readonly("measured", &rules::RuleStatus::measured)
       .def_property_readonly("next",
                              [](const rules::RuleStatus& self) {
-                               return self.next ? std::optional(name_of_act(*self.next)) : std::nullopt;
+                               return self.next ? std::optional(rules::name_of(*self.next)) : std::nullopt;
                              })
       .def_property_readonly("next_ns", [](const rules::RuleStatus& self) {
         return self.next ? std::optional(self.next_ns) : std::nullopt;
@@ -246,7 +246,7 @@ Raises MauveError (invalid_argument) for what cannot be so, IndexError for a rul
           "gives_way",
           [](const PyRuleEngine& self, std::size_t rule) {
             const auto act = self.engine.gives_way(self.rule(rule));
-            return act ? std::optional(name_of_act(*act)) : std::nullopt;
+            return act ? std::optional(rules::name_of(*act)) : std::nullopt;
           },
           py::arg("rule"),
           "The action of the rule that is to be called off, for that of a rule of higher rank.")

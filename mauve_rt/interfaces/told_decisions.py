@@ -66,7 +66,7 @@ class DecisionMessages:
         made = told.decision
         bound = self._bound(self._rules[made.rule], made.act)
         parts = ", ".join(f"{part.what} {part.seconds:.3f} s" for part in bound.parts) if bound else ""
-        known_s = (made.stamp_ns - made.sample_ns) / 1e9
+        known_s = (made.stamp_ns - made.sample_ns - made.held_ns) / 1e9
         return (
             f"rule {message.rule}: {made.act} took {message.took_s:.3f} s, longer than its bound of "
             f"{message.bound_s:.3f} s ({parts}); its end was known {known_s:.3f} s after the cause"
@@ -125,7 +125,10 @@ def rule_info(facts: RuleFacts, now_ns: int) -> Any:
 
 
 def _took_s(told: ToldDecision) -> float:
-    """From the cause to the last of the first releases after it; of a reserve action to its end."""
+    """From the cause to the last of the first releases after it; of a reserve action to its end.
+
+    Without the time for which it owed nothing.
+    """
     made, report = told.decision, told.report
     if made.decision != "done":
         return UNKNOWN_S
@@ -133,4 +136,4 @@ def _took_s(told: ToldDecision) -> float:
         return (made.stamp_ns - made.sample_ns) / 1e9
     steps = report.steps if report is not None else ()
     releases = [step.released_ns for step in steps if step.released_ns != NOT_MEASURED]
-    return (max(releases) - made.sample_ns) / 1e9 if releases else UNKNOWN_S
+    return (max(releases) - made.sample_ns - made.held_ns) / 1e9 if releases else UNKNOWN_S

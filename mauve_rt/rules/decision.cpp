@@ -10,6 +10,7 @@ namespace {
 constexpr auto kDecided = std::to_array<std::string_view>(
     {"armed", "suppressed", "adopted", "condition_true", "condition_false", "condition_unknown", "do", "undo",
      "otherwise", "done", "failed", "suppressed"});
+constexpr auto kActNames = std::to_array<std::string_view>({"do", "undo", "otherwise"});
 constexpr auto kWhy = std::to_array<std::string_view>(
     {"", "it is in effect already", "changed by another requester: left alone until the condition ends",
      "cooldown", "outranked by a rule of higher rank", "the action of another rule is under way",
@@ -19,6 +20,7 @@ constexpr auto kWhy = std::to_array<std::string_view>(
 }  // namespace
 
 std::string_view name_of(Decided decided) noexcept { return kDecided[static_cast<std::size_t>(decided)]; }
+std::string_view name_of(Act act) noexcept { return kActNames[index_of(act)]; }
 std::int64_t trace_code(const Decision& decision) noexcept {
   // Those of the last three are by act.
   constexpr auto kAlone = std::to_array<std::int64_t>({0, 1, 2, 3, 4, 16, 5, 6, 13});

@@ -63,6 +63,9 @@ struct Engine::Life {
   bool is_own{true};                          // what its `do` would do is there by a rule, if it is there
   std::optional<Act> under_way{};             // do or undo
   Look begun{};                               // the condition, as the last action began
+  time_ns_t begun_held_ns{0};                 // for so long after its dwell time it owed nothing
+  bool is_held{false};                        // outranked, or in cooldown: it owes nothing
+  time_ns_t free_since_ns{INT64_MIN};         // it is no longer held
   bool gives_way{false};                      // that is to be called off
   bool acts_soon{false};                      // `do` is due, and what keeps it from it passes
   bool otherwise_begun{false};                // since the condition has held
@@ -71,12 +74,18 @@ struct Engine::Life {
   std::array<bool, kActs> ready{true, true, true};
   time_ns_t not_before_ns{INT64_MIN};
   int failures{0};
+  std::pair<Act, Why> failed{};                  // the last one
   std::optional<std::pair<Act, Why>> excused{};  // the last reason given, so that it is given once
   std::optional<time_ns_t> unready_since_ns{};   // what it wants is not ready
 
   /// When the condition will have been as it is for long enough.
   time_ns_t due_ns() const noexcept {
     return later_by(last.since_ns, last.holds() ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
+  }
+  /// It owes nothing; it does from now on. What is late counts from then.
+  void hold() noexcept { is_held = true; }
+  void let_go(time_ns_t now_ns) noexcept {
+    if (std::exchange(is_held, false)) free_since_ns = now_ns;
   }
   /// Whether there is something that it could do.
   bool may_do() const noexcept { return !in_effect && !changed_by_another && !otherwise_begun; }
@@ -257,6 +266,8 @@ void Engine::look(Life& life, time_ns_t now_ns) noexcept {
     life.excused.reset();
     life.unready_since_ns.reset();
     life.otherwise_begun = false;
+    life.is_held = false;
+    life.free_since_ns = INT64_MIN;
   }
   // That nothing is known yet is no news, but where something is in effect.
   if (truth == life.told || (truth == Truth::unknown && life.told == Truth::no && !life.in_effect)) return;
@@ -305,6 +316,7 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
   }
   if (const Life* other = act == Act::do_ ? outranking(life) : nullptr) {
     life.waits_since_ns.reset();
+    life.hold();
     suppress(life, act, Why::outranked, now_ns, other);
     return;
   }
@@ -320,9 +332,11 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
   }
   const bool is_late_enough = now_ns >= life.not_before_ns;
   if (!is_late_enough && life.failures == 0) {
+    life.hold();
     suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
     return;
   }
+  life.let_go(now_ns);
   if (act == Act::do_ && want_otherwise(life, now_ns)) return;
   if (!is_late_enough || pending_) {  // in the next step, after what is pending
     life.acts_soon = act == Act::do_ && life.not_before_ns <= later_by(now_ns, kMakingReady);
@@ -388,6 +402,7 @@ void Engine::begun(time_ns_t now_ns) noexcept {
   pending_.reset();
   Life& life = *lives_[action.rule];
   life.begun = life.last;
+  life.begun_held_ns = life.free_since_ns > life.due_ns() ? life.free_since_ns - life.due_ns() : 0;
   Decided decided = Decided::otherwise;
   if (action.act == Act::otherwise) {
     life.otherwise_begun = true;
@@ -422,6 +437,7 @@ void Engine::ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) noexc
   const time_ns_t wait_ns = first_ns > (longest_ns >> life.failures) ? longest_ns : first_ns << life.failures;
   MAUVE_AUDIT(wait_ns > 0);
   life.failures = std::min(life.failures + 1, kMostDoublings);
+  life.failed = {act, why_of(how)};
   life.excused.reset();
   life.not_before_ns = later_by(now_ns, wait_ns);
   tell(life,
@@ -497,6 +513,7 @@ void Engine::tell(const Life& life, Decision decision) noexcept {
   decision.cause_ns = look.since_ns;
   decision.sample_ns = look.cause_ns();
   decision.measured = look.measured;
+  if (is_outcome) decision.held_ns = life.begun_held_ns;
   ring_[told % kRing] = decision;
   told_.store(told + 1, std::memory_order_release);
 }
@@ -517,6 +534,10 @@ RuleStatus Engine::status(std::size_t rule) const noexcept {
                     .changed_by_another = life.changed_by_another,
                     .since_ns = life.last.since_ns,
                     .measured = life.last.measured};
+  if (life.failures > 0) {
+    status.failed = life.failed.first;
+    status.why = life.failed.second;
+  }
   if (!life.armed) return status;
   if ((life.last.holds() || life.is_due) && !life.in_effect && !life.changed_by_another) {
     status.next = Act::do_;

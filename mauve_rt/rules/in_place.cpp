@@ -73,11 +73,15 @@ bool needs_running(const ActionStep& step) {
 
 }  // namespace
 
-bool can_begin(const ActionSteps& steps, const ArchitectureDescription& description) {
-  return std::all_of(steps.begin(), steps.end(), [&](const ActionStep& step) {
+std::string hindrance(const ActionSteps& steps, const ArchitectureDescription& description) {
+  for (const ActionStep& step : steps) {
+    if (!needs_running(step)) continue;
     const ComponentFacts* const facts = find(description.components, step.target);
-    return !needs_running(step) || (facts != nullptr && facts->state == ComponentState::running);
-  });
+    if (facts == nullptr) return "there is no component " + step.target;
+    if (facts->state != ComponentState::running)
+      return "component " + step.target + " is " + std::string(to_string(facts->state));
+  }
+  return {};
 }
 
 std::optional<bool> is_in_place(const ActionSteps& steps, const ArchitectureDescription& description) {

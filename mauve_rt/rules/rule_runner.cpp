@@ -14,7 +14,8 @@ namespace mauve::rules {
 
 namespace {
 
-constexpr int kPriority = 97;  // above components, below who conducts changes and who watches
+constexpr int kPriority = 97;                 // above components, below who conducts changes and who watches
+constexpr time_ns_t kPreparing = s_to_ns(1);  // a preparation that lasts longer is told
 constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 
 // What the follower found of a rule.
@@ -344,7 +345,9 @@ bool RuleRunner::prepare(std::size_t index) {
     work_.bump();
     engine_->wake();
   }
+  rule.preparing_since_ns.store(clock_.now_ns(), std::memory_order_relaxed);
   const bool is_other = make_ready(rule, changed);
+  rule.preparing_since_ns.store(0, std::memory_order_relaxed);
   keep(rule);
   if (is_other) engine_->wake();
   return changed || is_other;
@@ -391,6 +394,7 @@ void RuleRunner::report(std::size_t index) {
 void RuleRunner::deliver(Rule& rule, Act act, ActionReport report) {
   {
     const LockGuard lock(told_mutex_);
+    rule.failure = report.failure;
     rule.reports[index_of(act)].push_back(std::move(report));
   }
   work_.bump();
@@ -432,7 +436,7 @@ bool RuleRunner::look_around() {
     if (!ends[i]) continue;
     Rule& rule = *rules_[i];
     std::uint64_t found = (*ends[i] + 1) << kEndsAt;  // 0: never looked
-    if (can_begin(rule.action(Act::do_).steps(), description)) found |= kPresent;
+    if (hinder(rule, hindrance(rule.action(Act::do_).steps(), description))) found |= kPresent;
     for (const Act act : kPrepared) {
       const std::optional<bool> is_so = is_in_place(rule.action(act).steps(), description);
       if (is_so) found |= kKnown << index_of(act);
@@ -445,6 +449,17 @@ bool RuleRunner::look_around() {
     for (const auto& rule : rules_) rule->prepares.ask();
   }
   return changed;
+}
+
+/// For facts(); whether nothing hinders it.
+bool RuleRunner::hinder(Rule& rule, std::string hindrance) {
+  const bool is_free = hindrance.empty();
+  const LockGuard lock(told_mutex_);
+  if (rule.hindrance != hindrance) {
+    rule.hindrance = std::move(hindrance);
+    told_changed_.notify_all();
+  }
+  return is_free;
 }
 
 /// Why something cannot be heard.
@@ -533,6 +548,20 @@ std::uint64_t RuleRunner::lost() const {
   return engine_->lost() + left_out_;
 }
 
+/// The first of what keeps the rule from acting; both mutexes are held.
+std::string RuleRunner::problem_of(const Rule& rule) const {
+  if (!unobservable_.empty()) return unobservable_;
+  if (!rule.hindrance.empty()) return rule.hindrance;
+  if (!rule.kept.problem.empty()) return rule.kept.problem;
+  if (rule.status.failed) {
+    const std::string why = rule.failure.empty() ? std::string(words_of(rule.status.why)) : rule.failure;
+    return std::string(name_of(*rule.status.failed)) + " failed: " + why;
+  }
+  const time_ns_t since_ns = rule.preparing_since_ns.load(std::memory_order_relaxed);
+  if (since_ns != 0 && clock_.now_ns() - since_ns > kPreparing) return "its action is still being prepared";
+  return {};
+}
+
 std::vector<RuleFacts> RuleRunner::facts() const {
   std::vector<RuleFacts> all;
   const LockGuard told(told_mutex_);
@@ -542,7 +571,7 @@ std::vector<RuleFacts> RuleRunner::facts() const {
     all.push_back({.name = engine_->rule(i).name,
                    .status = rule.status,
                    .ready = rule.action(rule.status.in_effect ? Act::undo : Act::do_).is_ready(),
-                   .problem = unobservable_.empty() ? rule.kept.problem : unobservable_,
+                   .problem = problem_of(rule),
                    .memory_bytes = rule.kept.memory_bytes});
   }
   return all;

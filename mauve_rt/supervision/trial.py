@@ -65,13 +65,13 @@ class Trial:
 
     def _samples(self) -> Iterator[tuple[int, Heard, float]]:
         """Instants, what is heard, values, in the order of time."""
-        end_s = self._script.lasts_s
-        each = (
-            ((round(at_s * 1e9), number, value) for at_s, value in one.samples(end_s))
-            for number, one in enumerate(self._script.heard)
-        )
+        each = (self._samples_of(number) for number in range(len(self._script.heard)))
         for at_ns, number, value in heapq.merge(*each):
             yield at_ns, self._script.heard[number], value
+
+    def _samples_of(self, number: int) -> Iterator[tuple[int, int, float]]:
+        for at_s, value in self._script.heard[number].samples(self._script.lasts_s):
+            yield round(at_s * 1e9), number, value
 
     def _hear(self, one: Heard, value: float) -> None:
         for number, signal in enumerate(self._rules.signals):

@@ -808,6 +808,50 @@ TEST(Rules, WhatWasDueIsStillDoneWhenTheConditionBecomesUnknown) {
   EXPECT_FALSE(tried.engine.status(0).in_effect);
 }
 
+TEST(Rules, WhatARuleTookCountsFromWhenItWasEntitled) {
+  Rule low{.name = "low",
+           .when = leaf("boolean", {{"topic", "a"}}),
+           .for_ns = ms(100),
+           .undoes = true,
+           .about = {"c"}};
+  Rule high = low;
+  high.name = "high";
+  high.when = leaf("boolean", {{"topic", "b"}});
+  high.priority = 9;
+  Tried tried({low, high});
+  tried.tell(1, 1.0);
+  tried.run_to(ms(500));
+  tried.tell(0, 1.0);  // due at 600, and outranked
+  tried.run_to(ms(7'000));
+  tried.tell(1, 0.0);
+  tried.run_to(ms(8'000));
+  const auto done = std::find_if(tried.decisions.rbegin(), tried.decisions.rend(), [](const Decision& one) {
+    return one.decided == Decided::done && one.rule == 0;
+  });
+  ASSERT_NE(tried.decisions.rend(), done);
+  EXPECT_EQ(ms(500), done->cause_ns);
+  EXPECT_EQ(ms(7'000) - ms(600), done->held_ns);
+  for (const Decision& one : tried.decisions) {
+    EXPECT_TRUE(one.rule == 0 || one.held_ns == 0);
+  }
+}
+
+TEST(Rules, WhoFailsSaysSoUntilItSucceedsOrItsConditionEnds) {
+  Tried tried({{.name = "r", .when = leaf("boolean", {{"topic", "a"}}), .undoes = true, .about = {"c"}}});
+  tried.ending = Ended::refused;
+  tried.tell(0, 1.0);
+  EXPECT_EQ(Act::do_, tried.engine.status(0).failed);
+  EXPECT_EQ(Why::refused, tried.engine.status(0).why);
+  tried.ending = Ended::done;
+  tried.run_to(s_to_ns(2));
+  EXPECT_FALSE(tried.engine.status(0).failed);
+  tried.ending = Ended::timed_out;
+  tried.tell(0, 0.0);
+  EXPECT_EQ(Act::undo, tried.engine.status(0).failed);
+  tried.tell(0, 1.0);
+  EXPECT_FALSE(tried.engine.status(0).failed);
+}
+
 TEST(Rules, WhatSomebodyElseDidIsNotUndone) {
   Rule undoing = rule("r", silence(1.0));
   for (const bool takes_over : {false, true}) {

@@ -34,6 +34,21 @@ def test_the_story_and_the_timeline_of_the_documentation(play: Try) -> None:
     assert play() == (0, STORY, "")
 
 
+def test_each_line_of_a_script_tells_of_its_own(play: Try) -> None:
+    """An emergency stop beside a topic that repeats its values."""
+    value = "{{value: {{topic: {}, type: std_msgs/msg/Float64, field: data, above: {}}}}}"
+    do = "    do: [{{kind: replace_core, target: {}, name: p/Safe}}]\n"
+    rules = "mauve: 1\nrules:\n"
+    for name, topic, above, target in (("estop", "stop", 0.5, "one"), ("hot", "heat", 80, "two")):
+        rules += f"  - name: {name}\n    when: {value.format(topic, above)}\n{do.format(target)}"
+    lines = ["{topic: stop, from_s: 5.0, value: 1.0}", "{topic: heat, every_s: 1.0, value: 20.0}"]
+    for heard in (lines, lines[::-1]):
+        status, out, _ = play(rules, f"mauve: 1\nlasts_s: 20\nheard: [{', '.join(heard)}]\n")
+        assert status == 0
+        assert "5.000 s  estop: condition_true: data of stop is 1" in out
+        assert "hot: condition_true" not in out
+
+
 def test_equal_scripts_give_equal_stories(play: Try) -> None:
     assert play() == play()
 

@@ -21,7 +21,8 @@ from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
-from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore
+from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore, Stop
+from mauve_msgs.srv import Start as StartComponent
 from mauve_rt.control.requests import Code
 
 NODE = "/robot_1/executor"
@@ -413,6 +414,24 @@ def test_what_cannot_be_made_ready_is_an_error_at_once(start: Start, graph: Any)
     (listed,) = graph.ask(ListRules, f"{NODE}/list_rules").rules
     assert not listed.ready
     assert SAFE in listed.problem
+
+
+def test_a_rule_whose_component_does_not_run_is_an_error(start: Start, graph: Any):
+    robot = start()
+    robot.await_said("armed")
+    health = graph.hear(DiagnosticArray, "/diagnostics")
+
+    def status() -> Any:
+        found = [each for array in health for each in array.status if each.name == f"{NODE}: rule quiet"]
+        return found[-1] if found else DiagnosticStatus()
+
+    assert graph.ask(Stop, f"{NODE}/stop", component="counter").success
+    graph.spin_until(lambda: status().level == DiagnosticStatus.ERROR, "the error")
+    assert status().message == "cannot act: component counter is STOPPED"
+    (listed,) = graph.ask(ListRules, f"{NODE}/list_rules").rules
+    assert listed.problem == "component counter is STOPPED"
+    assert graph.ask(StartComponent, f"{NODE}/start", component="counter").success
+    graph.spin_until(lambda: status().level == DiagnosticStatus.OK, "a rule that watches")
 
 
 def test_bad_rules_configure_nothing(

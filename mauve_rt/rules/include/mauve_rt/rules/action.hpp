@@ -34,8 +34,8 @@ Transaction make_transaction(const ActionSteps& steps, const std::string& rule =
 std::string rule_author(const std::string& rule);
 /// Whether all that the steps ask for was done by rules. [non-rt]
 bool is_by_rules(const ActionSteps& steps, const std::vector<Authored>& authors);
-/// Whether the components of which they replace or set something are there and run. [non-rt]
-bool can_begin(const ActionSteps& steps, const ArchitectureDescription& description);
+/// Which of the components of which they replace or set something is not there, or does not run, in words; empty: none. [non-rt]
+std::string hindrance(const ActionSteps& steps, const ArchitectureDescription& description);
 /// Whether all that the steps ask for is so; nothing: they leave nothing behind that a description tells. [non-rt]
 std::optional<bool> is_in_place(const ActionSteps& steps, const ArchitectureDescription& description);
 

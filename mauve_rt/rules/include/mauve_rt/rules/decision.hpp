@@ -62,11 +62,14 @@ struct Decision {
   time_ns_t cause_ns{0};   // since when the condition has been as it is
   time_ns_t sample_ns{0};  // what made it so: the last sample before a silence, the first one beyond a bound
   time_ns_t wait_ns{0};    // of cooldown and failed
-  double measured{0.0};    // what the condition looks at: s of silence, a value, how many
+  time_ns_t held_ns{
+      0};  // of done and failed: for so long after its dwell time a higher rule or its cooldown held it back
+  double measured{0.0};  // what the condition looks at: s of silence, a value, how many
 };
 
 /// Their names, as in SupervisorDecision.msg. [rt]
 std::string_view name_of(Decided decided) MAUVE_RT;
+std::string_view name_of(Act act) MAUVE_RT;
 /// What a trace record of the kind `decision` calls it, with the act: `a` in TraceRecord.msg. [rt]
 std::int64_t trace_code(const Decision& decision) MAUVE_RT;
 /// In words, for people. [rt]

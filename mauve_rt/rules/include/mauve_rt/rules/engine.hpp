@@ -56,6 +56,8 @@ struct RuleStatus {
   double measured{0.0};
   std::optional<Act> next{};    // what it is going to want if nothing changes
   time_ns_t next_ns{kForever};  // when
+  std::optional<Act> failed{};  // the last action, which is to be tried again
+  Why why{Why::none};           // it failed
 
   /// [rt]
   bool holds() const MAUVE_RT { return truth == Truth::yes; }

@@ -44,7 +44,7 @@ struct RuleFacts {
   std::string name{};
   RuleStatus status{};
   bool ready{false};            // what it would do or undo next could begin
-  std::string problem{};        // why that cannot be prepared, or what it hears not be heard; empty: it can
+  std::string problem{};        // what keeps it from acting, now or when it is time; empty: nothing
   std::size_t memory_bytes{0};  // of what is kept prepared
 };
 
@@ -69,7 +69,9 @@ struct RuleFacts {
 /// | Rule::in_effect, may_prepare | decision thread | preparation thread | relaxed: the thread is asked after it         |
 /// | Rule::status      | decision thread | facts()         | status_mutex_, which the decision thread only tries         |
 /// | Rule::held        | follower        | the same        | -                                                           |
-/// | Rule::reports, kept | preparation thread, reserve thread | follower, facts() | told_mutex_                            |
+/// | Rule::reports, failure, kept | preparation thread, reserve thread | follower, facts() | told_mutex_                   |
+/// | Rule::hindrance   | follower        | facts()         | told_mutex_                                                 |
+/// | Rule::preparing_since_ns | preparation thread | facts() | relaxed: a lone instant                                  |
 /// | work_ (futex)     | anyone          | follower        | release/acquire: who sees the bump sees the work            |
 /// | ending_ (futex)   | stop()          | decision thread, follower | release/acquire                                   |
 /// | told_ ... woken_, unobservable_ | follower, wake() | anyone | told_mutex_                                          |
@@ -137,6 +139,9 @@ class RuleRunner {
     std::array<std::deque<ActionReport>, kActs> reports{};  // by Act
     std::uint32_t structure{UINT32_MAX};                    // the preparation thread's: at its last look
     Kept kept{};
+    Atomic<time_ns_t> preparing_since_ns{0};  // 0: nothing is being prepared
+    std::string hindrance{};                  // why it is not armed
+    std::string failure{};                    // of the action that has ended last
   };
 
   void run_decisions() noexcept;
@@ -153,6 +158,8 @@ class RuleRunner {
   bool prepare(std::size_t index);
   bool make_ready(Rule& rule, bool after_own);
   void keep(Rule& rule);
+  bool hinder(Rule& rule, std::string hindrance);
+  std::string problem_of(const Rule& rule) const MAUVE_REQUIRES(told_mutex_);
   void report(std::size_t index);
   void deliver(Rule& rule, Act act, ActionReport report);
   bool look_around();
