@@ -334,7 +334,8 @@ void Task::claim_revision(std::uint64_t expected) {
 }
 
 /// The state and the bit go together: a stop that is late must not end the run that follows.
-void Task::order_stop(std::uint64_t expected_revision) {
+/// Returns the number of the run that is to end.
+std::uint32_t Task::order_stop(std::uint64_t expected_revision) {
   const LockGuard lock(order_mutex_);
   auto seen = state_.load(std::memory_order_acquire);
   if (const auto found = static_cast<ComponentState>(seen);
@@ -354,6 +355,8 @@ void Task::order_stop(std::uint64_t expected_revision) {
                  .found = std::string(to_string(static_cast<ComponentState>(seen)))});
   }
   control_.fetch_or(kStop, std::memory_order_acq_rel);
+  const std::uint32_t ended = ended_runs_.load(std::memory_order_acquire);
+  return state() == ComponentState::stopped ? ended - 1 : ended;  // STOPPED: it has ended since
 }
 
 bool Task::is_called_from_own_state() const noexcept {
@@ -373,16 +376,18 @@ bool Task::withdraw_start() noexcept {
 bool Task::stop(time_ns_t timeout_ns, bool force, std::uint64_t expected_revision) {
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   if (expected_revision == 0 && withdraw_start()) return false;
-  order_stop(expected_revision);
+  const std::uint32_t run = order_stop(expected_revision);
   changes_.bump();
   if (is_called_from_own_state())
     return false;  // it takes effect when the state ends, for which nobody can wait here
   if (simulated_) resume();
   futex_wake_all(control_);
   // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.
-  const auto is_going = [](std::uint32_t found) {
+  // In another run somebody has started it again since: this stop has had its effect.
+  const auto is_going = [&](std::uint32_t found) {
     const auto state = static_cast<ComponentState>(found);
-    return state != ComponentState::stopped && state != ComponentState::faulted;
+    return state != ComponentState::stopped && state != ComponentState::faulted &&
+           ended_runs_.load(std::memory_order_acquire) == run;
   };
   for (auto seen = state_.load(std::memory_order_acquire); is_going(seen);
        seen = state_.load(std::memory_order_acquire)) {

@@ -86,6 +86,7 @@ struct ChangeSignal {
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
+/// | ended_runs_            | machine                               | who stops    | release/acquire: the run's end     |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | outputs_ (futex)       | who times it out, writer, machine     | all of these | acq_rel: one at a time writes them |
 /// | demoted_, time_out_note_ | who times it out, machine           | machine      | execution_                         |
@@ -360,7 +361,7 @@ class Task final : public Waiter {
 
   // commands
   void post_start(time_ns_t instant_ns) noexcept;
-  void order_stop(std::uint64_t expected_revision);
+  std::uint32_t order_stop(std::uint64_t expected_revision);
   void claim_revision(std::uint64_t expected);
   time_ns_t start_on(std::optional<time_ns_t> reference_ns) noexcept;
   time_ns_t next_instant() const noexcept;
@@ -467,6 +468,7 @@ class Task final : public Waiter {
   Atomic<std::uint32_t> ready_{0};
   Atomic<std::uint32_t> ended_{0};
   Atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
+  Atomic<std::uint32_t> ended_runs_{0};
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
   Atomic<std::uint32_t> slot_{kEmpty};
   Atomic<Participant*> participant_{nullptr};
