@@ -246,11 +246,15 @@ to 0.1 ms where it is longer, for components in Python.)")
 The architecture can be deployed again.)")
       .def(
           "stop",
-          [](PyHost& self, const std::string& component, time_ns_t timeout_ns, bool force) {
-            return self.host().stop(component, {.timeout_ns = timeout_ns, .force = force});
+          [](PyHost& self, const std::string& component, time_ns_t timeout_ns, bool force,
+             std::uint64_t expected_revision) {
+            return self.host().stop(
+                component,
+                {.timeout_ns = timeout_ns, .force = force, .expected_revision = expected_revision});
           },
           py::arg("component"), py::arg("timeout_ns") = s_to_ns(1), py::kw_only(), py::arg("force") = false,
-          Unlocked(), R"(Stops a component at the end of its state; a wait ends at once.
+          py::arg("expected_revision") = 0, Unlocked(),
+          R"(Stops a component at the end of its state; a wait ends at once.
 
 By force: a component that still executes a state, or a guard, at the time-out is given up. It is
 FAULTED, its outputs are written as on a stop, and its thread is left behind until the state ends.
@@ -258,13 +262,14 @@ True when that was done. A core that loops in Python is given up like any other.
 never releases the interpreter's lock stops all Python of the process, this call included.
 
 Raises:
-    MauveError: not_running; timeout, and the stop stays pending: it takes effect when the state ends.)")
+    MauveError: not_running; timeout, and the stop stays pending: it takes effect when the state ends;
+        wrong_revision where the architecture is not at `expected_revision` (0: any).)")
       .def(
           "start",
-          [](PyHost& self, const std::string& component, std::optional<time_ns_t> clock_ns) {
-            self.host().start(component, clock_ns);
-          },
-          py::arg("component"), py::arg("clock_ns") = std::nullopt, Unlocked())
+          [](PyHost& self, const std::string& component, std::optional<time_ns_t> clock_ns,
+             std::uint64_t expected_revision) { self.host().start(component, clock_ns, expected_revision); },
+          py::arg("component"), py::arg("clock_ns") = std::nullopt, py::kw_only(),
+          py::arg("expected_revision") = 0, Unlocked())
       .def(
           "get_time",
           [](PyHost& self, const std::string& component) { return self.host().get_time(component); },

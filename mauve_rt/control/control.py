@@ -205,7 +205,7 @@ class Control:
                 if part.name == step.target:
                     check_state(step, part)
             if not request.dry_run:
-                return self._start_or_stop(step, request)
+                return self._start_or_stop(step, request, kernel_revision=kernel_revision)
         with self._bound(plan.bound, dry_run=request.dry_run):
             committed = self._commit(plan.transaction, request, kernel_revision=kernel_revision)
         if request.dry_run:
@@ -278,10 +278,18 @@ class Control:
         except MauveError as error:
             if error_code(error) in _CALLED_OFF:
                 check_time(request, self._runtime)  # whether it was by a deactivation
-            if error_code(error) == "wrong_revision":  # of what changed meanwhile, in our own count
-                self._runtime.observe()
-                check_revision(request, self._runtime)
+            self._check_again(request, error)
             raise
+
+    def _check_again(self, request: Request, error: MauveError) -> None:
+        """Report a change that came in between in the executor's own count of revisions."""
+        if error_code(error) != "wrong_revision":
+            return
+        self._runtime.observe()
+        check_revision(request, self._runtime)
+        if getattr(error, "element", "") == "revision":
+            text = f"another change is being made at revision {request.expected_revision}"
+            raise RefusalError(Code.WRONG_REVISION, f"{text}; read ~/state, then ask again") from error
 
     def _order(self, request: Request, order: RecordingOrder) -> Outcome:
         check_revision(request, self._runtime)
@@ -317,16 +325,22 @@ class Control:
         only_properties = all(step.kind == "set_property" for step in steps)
         return 0 if only_properties else self._phase_timeout_ns
 
-    def _start_or_stop(self, step: Step, request: Request) -> Outcome:
+    def _start_or_stop(self, step: Step, request: Request, *, kernel_revision: int) -> Outcome:
         """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
-        if step.kind == "stop":
-            forced = self._runtime.host.stop(step.target, _timeout_ns(request), force=request.force)
-            message = f"component '{step.target}' is stopped"
-            if forced:
-                message += " by force: it is FAULTED, and its thread is left behind until its state ends"
-        else:
-            self._runtime.host.start(step.target, request.clock_ns or None)
-            message = f"component '{step.target}' is started"
+        host, expected = self._runtime.host, kernel_revision if request.expected_revision else 0
+        try:
+            if step.kind == "stop":
+                timeout_ns = _timeout_ns(request)
+                forced = host.stop(step.target, timeout_ns, force=request.force, expected_revision=expected)
+                message = f"component '{step.target}' is stopped"
+                if forced:
+                    message += " by force: it is FAULTED, and its thread is left behind until its state ends"
+            else:
+                host.start(step.target, request.clock_ns or None, expected_revision=expected)
+                message = f"component '{step.target}' is started"
+        except MauveError as error:
+            self._check_again(request, error)
+            raise
         self._runtime.architecture.note_author(step.target, "state", request.author)
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
 

@@ -379,6 +379,8 @@ class Runtime:
                 self.active,
                 self.kernel_revision(),
             )  # first: what comes after is news
+            # Until each component has taken a change, descriptions follow without another kernel revision.
+            is_settled = self._host is None or not self._host.open_changes()
             is_own = changed_since is not None and self._revision in (changed_since, self._claimed)
             if anew or mark != self._mark or is_own:
                 parts = self.components()
@@ -386,7 +388,8 @@ class Runtime:
                 if seen != self._seen or is_own:
                     self._seen = seen
                     self._revision += 1
-                self._mark, self._observed = mark, Observed(self._revision, parts)
+                self._mark = mark if is_settled else None
+                self._observed = Observed(self._revision, parts)
             if changed_since is not None:
                 self._claimed = self._revision
             return self._observed

@@ -43,9 +43,10 @@ void Host::require_deployed() const {
               {.remedy = "call deploy() first"});
 }
 
-void Host::start(const std::string& component, std::optional<time_ns_t> clock_ns) {
+void Host::start(const std::string& component, std::optional<time_ns_t> clock_ns,
+                 std::uint64_t expected_revision) {
   require_deployed();
-  architecture_.hold_component(component)->task().start(clock_ns);
+  architecture_.hold_component(component)->task().start(clock_ns, s_to_ns(2), expected_revision);
 }
 
 void Host::stop(const std::string& component, time_ns_t timeout_ns) {
@@ -65,7 +66,8 @@ bool Host::stop(const std::string& component, const StopOptions& options) {
     } catch (const Error&) {  // the error that is reported is that of the listed component
     }
   }
-  return architecture_.hold_component(component)->task().stop(timeout_ns, options.force);
+  return architecture_.hold_component(component)->task().stop(timeout_ns, options.force,
+                                                              options.expected_revision);
 }
 
 std::shared_ptr<Component> Host::find_leaving(const std::string& name, const Component* present) const {

@@ -62,6 +62,13 @@ void ChangeSignal::bump() noexcept {
   if (listener.is_set()) listener.use([](ChangeSignal& other) { other.bump(); });
 }
 
+bool ChangeSignal::claim(std::uint32_t seen) noexcept {
+  // acq_rel: the caller acts after the changes that `seen` counts, and who sees the claim acts after it
+  if (!word.compare_exchange_strong(seen, seen + 1, std::memory_order_acq_rel)) return false;
+  futex_wake_all(word);
+  return true;
+}
+
 Task::Task(std::string name, std::uint16_t number, ChangeSignal& changes)
     : name_(std::move(name)), number_(number), changes_(changes) {}
 
@@ -222,7 +229,7 @@ void Task::post_start(time_ns_t instant_ns) noexcept {
   futex_wake_all(control_);
 }
 
-void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
+void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns, std::uint64_t expected_revision) {
   if (is_called_from_own_state()) require_startable();  // refused without the lock, as in stop()
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   const auto throw_late = [&](const char* what, const char* remedy) {
@@ -241,6 +248,7 @@ void Task::start(std::optional<time_ns_t> clock_ns, time_ns_t timeout_ns) {
   if (state() == ComponentState::stopped && !is_parked() && !wait_started(until))
     throw_late("the component has yet to take up an earlier start; it was not started again", "try again");
   require_startable();
+  claim_revision(expected_revision);
   post_start(start_on(clock_ns));
   if (wait_started(until)) return;
   if (withdraw_start())
@@ -317,10 +325,29 @@ void Task::throw_state_running(const std::string& what, time_ns_t timeout_ns,
                .remedy = remedy});
 }
 
+/// Where an architecture has changed since, nothing is started or stopped; two that expect one revision are not both done.
+void Task::claim_revision(std::uint64_t expected) {
+  if (expected == 0) return;
+  bool is_claimed = false;
+  if (changes_.listener.is_set())
+    changes_.listener.use(
+        [&](ChangeSignal& all) { is_claimed = all.claim(static_cast<std::uint32_t>(expected - 1)); });
+  if (is_claimed) return;
+  throw Error(ErrorCode::wrong_revision, "the architecture has changed since",
+              {.component = name_,
+               .element = "revision",
+               .expected = std::to_string(expected),
+               .remedy = "read it again, then ask again"});
+}
+
 /// The state and the bit go together: a stop that is late must not end the run that follows.
-void Task::order_stop() {
+/// Returns the number of the run that is to end.
+std::uint32_t Task::order_stop(std::uint64_t expected_revision) {
   const LockGuard lock(order_mutex_);
   auto seen = state_.load(std::memory_order_acquire);
+  if (const auto found = static_cast<ComponentState>(seen);
+      found == ComponentState::running || found == ComponentState::stopping)
+    claim_revision(expected_revision);
   while (static_cast<ComponentState>(seen) == ComponentState::running) {
     // acq_rel: a fault in between wins
     if (state_.compare_exchange_weak(seen, static_cast<std::uint32_t>(ComponentState::stopping),
@@ -335,6 +362,8 @@ void Task::order_stop() {
                  .found = std::string(to_string(static_cast<ComponentState>(seen)))});
   }
   control_.fetch_or(kStop, std::memory_order_acq_rel);
+  const std::uint32_t ended = ended_runs_.load(std::memory_order_acquire);
+  return state() == ComponentState::stopped ? ended - 1 : ended;  // STOPPED: it has ended since
 }
 
 bool Task::is_called_from_own_state() const noexcept {
@@ -356,19 +385,21 @@ void Task::end_wait_for_start() noexcept {
   futex_wake_all(started_);
 }
 
-bool Task::stop(time_ns_t timeout_ns, bool force) {
+bool Task::stop(time_ns_t timeout_ns, bool force, std::uint64_t expected_revision) {
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
-  if (withdraw_start()) return false;
-  order_stop();
+  if (expected_revision == 0 && withdraw_start()) return false;
+  const std::uint32_t run = order_stop(expected_revision);
   changes_.bump();
   if (is_called_from_own_state())
     return false;  // it takes effect when the state ends, for which nobody can wait here
   if (simulated_) resume();
   futex_wake_all(control_);
   // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.
-  const auto is_going = [](std::uint32_t found) {
+  // In another run somebody has started it again since: this stop has had its effect.
+  const auto is_going = [&](std::uint32_t found) {
     const auto state = static_cast<ComponentState>(found);
-    return state != ComponentState::stopped && state != ComponentState::faulted;
+    return state != ComponentState::stopped && state != ComponentState::faulted &&
+           ended_runs_.load(std::memory_order_acquire) == run;
   };
   for (auto seen = state_.load(std::memory_order_acquire); is_going(seen);
        seen = state_.load(std::memory_order_acquire)) {

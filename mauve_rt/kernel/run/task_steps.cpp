@@ -220,7 +220,9 @@ void Task::park(ComponentState state) noexcept {
   control_.fetch_and(~(kStop | kEvent | kRevert | kGivenUp), std::memory_order_acq_rel);
   parked_.store(1, std::memory_order_seq_cst);  // seq_cst: a requester that has not seen it has posted before
   publish_state(state);
-  settle_slot();  // last: who is refused finds the state that tells why
+  ended_runs_.fetch_add(
+      1, std::memory_order_release);  // release: who sees the next run has seen the end of this one
+  settle_slot();                      // last: who is refused finds the state that tells why
   release_withdrawn();
 }
 

@@ -105,6 +105,32 @@ TEST_F(Rule6Threads, AStopNeverWaitsOutAPeriod) {
   EXPECT_GE(before_the_instant * 10, stops.size() * 9) << "parked before the instant it was waiting for";
 }
 
+TEST_F(Rule6Threads, AStopEndsThoughTheComponentIsStartedAgainAtOnce) {
+  Component& component = add("c", 1);
+  deploy();
+  wait_runs(component, 1);
+  std::atomic<bool> is_over{false};
+  std::thread starter([&] {
+    while (!is_over) {
+      try {
+        deployer.start("c");
+      } catch (const Error&) {  // it runs
+      }
+    }
+  });
+  int stops = 0;
+  while (stops < 1'000 && !HasFailure()) {
+    try {
+      deployer.stop("c", s_to_ns(20));
+      ++stops;
+    } catch (const Error& error) {
+      EXPECT_EQ(ErrorCode::not_running, error.code()) << error.what();
+    }
+  }
+  is_over = true;
+  starter.join();
+}
+
 TEST_F(Rule6Threads, AStopInMidExecutionLeavesNoStateHalfRun) {
   TaskSettings settings{.cpus = {0}};
   settings.trace_records = std::size_t{1} << 16U;

@@ -59,6 +59,19 @@ def test_stop_and_start(running: Running):
     assert (running.host.get_time("first") - running.host.epoch_ns) % (2 * MS) == 0
 
 
+def test_of_a_start_and_stops_at_one_revision_one_is_done(running: Running):
+    running.deploy()
+    running.run_for(20 * MS)
+    revision = running.architecture.revision()
+    running.host.stop("first", expected_revision=revision)
+    for _ in range(2):  # a refusal changes nothing
+        assert refusal(lambda: running.host.stop("second", expected_revision=revision)) == "wrong_revision"
+        assert refusal(lambda: running.host.start("first", expected_revision=revision)) == "wrong_revision"
+    assert (running.state("first"), running.state("second")) == ("STOPPED", "RUNNING")
+    running.host.start("first", expected_revision=running.architecture.revision())
+    assert running.state("first") == "RUNNING"
+
+
 def test_a_transaction_and_what_it_reports(running: Running):
     running.deploy()
     running.run_for(20 * MS)

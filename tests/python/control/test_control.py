@@ -508,6 +508,27 @@ def test_what_is_stopped_while_a_request_is_planned_is_another_revision(
     assert _ask(control, *steps).success, "who names no revision is concerned by its own components only"
 
 
+@pytest.mark.parametrize(("kind", "target"), [("stop", "brave"), ("start", "free")])
+def test_a_start_or_stop_is_refused_after_a_change_that_it_has_not_seen(
+    runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch, kind: str, target: str
+) -> None:
+    assert _ask(control, Step("stop", "free")).success
+    revision, plan = runtime.revision, executor_control.Plan
+
+    def change_meanwhile(steps: tuple[Step, ...], *rest: Any, **limits: Any) -> Any:
+        if steps[0].kind == kind:
+            runtime.host.set_property("counter", "step", 2.0)
+        return plan(steps, *rest, **limits)
+
+    monkeypatch.setattr(executor_control, "Plan", change_meanwhile)
+    state = _part(runtime, target).state
+    refused = _ask(control, Step(kind, target), expected_revision=revision)
+    assert refused.code is Code.WRONG_REVISION
+    assert f"is at revision {revision + 1}, the request expected {revision};" in refused.message
+    assert _part(runtime, target).state == state
+    assert _ask(control, Step(kind, target)).success, "a request that names no revision goes on"
+
+
 def test_the_author_of_each_change_is_known(runtime: Runtime, control: Control) -> None:
     assert runtime.authors() == {}, "all is from the file"
     steps = (

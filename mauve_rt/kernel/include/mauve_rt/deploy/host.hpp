@@ -19,6 +19,7 @@ namespace mauve {
 struct StopOptions {
   time_ns_t timeout_ns{s_to_ns(1)};
   bool force{false};  // a component whose state does not end by then is given up, as Task::stop() says
+  std::uint64_t expected_revision{0};  // of the architecture; 0: any
 };
 
 /// What came of an abandon().
@@ -52,7 +53,9 @@ class Host : public Runner {
   /// under way is called off, and a change that comes to its commit later finds the host shut down. [non-rt]
   virtual void shutdown() noexcept = 0;
 
-  void start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt);
+  /// As Task::start().
+  void start(const std::string& component, std::optional<time_ns_t> clock_ns = std::nullopt,
+             std::uint64_t expected_revision = 0);
   void stop(const std::string& component, time_ns_t timeout_ns = s_to_ns(1));
   /// As Task::stop(); true when the component was given up: it is FAULTED then, and its thread left behind.
   bool stop(const std::string& component, const StopOptions& options);

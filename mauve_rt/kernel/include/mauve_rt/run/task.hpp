@@ -63,6 +63,8 @@ struct ChangeSignal {
     if (other != nullptr) listener.set(*other);
   }
   void bump() MAUVE_RT;  // [rt]
+  /// Bumps unless there was a bump since `word` had this value: of several callers at one value one has it. [rt]
+  bool claim(std::uint32_t seen) MAUVE_RT;
 };
 
 /// Runs one component.
@@ -84,6 +86,7 @@ struct ChangeSignal {
 /// | awaiting_release_      | machine; who takes it out owns it     | both         | acq_rel: hands over the commit     |
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
+/// | ended_runs_            | machine                               | who stops    | release/acquire: the run's end     |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | outputs_ (futex)       | who times it out, writer, machine     | all of these | acq_rel: one at a time writes them |
 /// | demoted_, time_out_note_ | who times it out, machine           | machine      | execution_                         |
@@ -210,16 +213,18 @@ class Task final : public Waiter {
   /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
   /// is still to come is the start itself; without one it is the deployment's first instant. Another fsm keeps that grid.
   /// [non-rt] Throws Error: already_running, faulted, not_configured; timeout while a commit or another command of the
-  /// component lasts, or when its thread does not get to run; it is not started then.
-  void start(std::optional<time_ns_t> clock_ns = std::nullopt, time_ns_t timeout_ns = s_to_ns(2));
+  /// component lasts, or when its thread does not get to run; it is not started then. wrong_revision, as of stop().
+  void start(std::optional<time_ns_t> clock_ns = std::nullopt, time_ns_t timeout_ns = s_to_ns(2),
+             std::uint64_t expected_revision = 0);
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
   /// A commit that the component takes part in is called off, unless it is made: then it is taken first. Waits for no other
   /// component.
   /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
   /// By force: a component that still executes a state, or a guard, when the time is over is given up: it is FAULTED, its outputs
   /// are written as on a stop, its thread is demoted and left behind until the state ends. True when that was done.
-  /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending.
-  bool stop(time_ns_t timeout_ns = s_to_ns(1), bool force = false);
+  /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending; wrong_revision where
+  /// the architecture is not at `expected_revision` (0: any), and nothing is stopped.
+  bool stop(time_ns_t timeout_ns = s_to_ns(1), bool force = false, std::uint64_t expected_revision = 0);
   /// Nominal instant of the last entry of the initial state (Listing 3). [rt]
   time_ns_t get_time() const MAUVE_RT {
     return machine_.context().instant_ns.load(std::memory_order_relaxed);
@@ -356,7 +361,8 @@ class Task final : public Waiter {
 
   // commands
   void post_start(time_ns_t instant_ns) noexcept;
-  void order_stop();
+  std::uint32_t order_stop(std::uint64_t expected_revision);
+  void claim_revision(std::uint64_t expected);
   time_ns_t start_on(std::optional<time_ns_t> reference_ns) noexcept;
   time_ns_t next_instant() const noexcept;
   time_ns_t restart_instant(const Participant& participant) noexcept;
@@ -464,6 +470,7 @@ class Task final : public Waiter {
   Atomic<std::uint32_t> ready_{0};
   Atomic<std::uint32_t> ended_{0};
   Atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
+  Atomic<std::uint32_t> ended_runs_{0};
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
   Atomic<std::uint32_t> slot_{kEmpty};
   Atomic<Participant*> participant_{nullptr};
