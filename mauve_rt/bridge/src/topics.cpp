@@ -26,7 +26,7 @@ std::vector<Arrival*> BoundTopic::arrivals(Lane lane) {
 }
 
 void BoundTopic::report(BridgeReport& report) const {
-  const std::lock_guard lock(refusal_mutex_);
+  const LockGuard lock(refusal_mutex_);
   report.topics.push_back({.resource = resource_name(),
                            .topic = full_name(),
                            .counts = counter_.counts(),
@@ -38,7 +38,7 @@ void BoundTopic::explain(std::span<const std::byte> message, time_ns_t now) {
   if (now < explained_ns_ + kExplainEvery) return;
   explained_ns_ = now;
   std::string refusal = resource().why_refused(message);
-  const std::lock_guard lock(refusal_mutex_);
+  const LockGuard lock(refusal_mutex_);
   refusal_ = std::move(refusal);
 }
 

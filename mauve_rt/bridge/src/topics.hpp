@@ -6,8 +6,9 @@
 #include <rcl/subscription.h>
 
 #include <memory>
-#include <mutex>
 #include <string>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 #include "binding.hpp"
 #include "owned.hpp"
@@ -47,8 +48,9 @@ class BoundTopic : public Binding {
   std::size_t number_;
   TrafficCounter counter_;
   time_ns_t explained_ns_{0};  // of the thread that counts
-  mutable std::mutex refusal_mutex_;
-  std::string refusal_;  // under refusal_mutex_: that thread writes it, others look
+  mutable Mutex refusal_mutex_;
+  std::string refusal_
+      MAUVE_GUARDED_BY(refusal_mutex_);  // under refusal_mutex_: that thread writes it, others look
 };
 
 /// Publishes what is written to a resource. For one thread at a time.
