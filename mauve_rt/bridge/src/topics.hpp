@@ -75,16 +75,20 @@ class OutgoingTopic final : public BoundTopic {
 /// repaired. Taken from by the receiver's thread.
 class ArrivalTwin final : public Arrival {
  public:
-  /// The resource outlives it. Throws Error as IncomingTopic. [non-rt]
-  ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, Resource& resource);
+  /// `messages` writes them to the resource; both outlive it. Throws Error as IncomingTopic. [non-rt]
+  ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, const Arrival& messages, Resource& resource);
 
  private:
   void join(rcl_wait_set_t& set) override;
-  bool has_arrived(const rcl_wait_set_t& set) const override { return set.subscriptions[place_] != nullptr; }
+  /// Also when messages wait to be written, perhaps more of them than were taken now: then nothing is caught up.
+  bool has_arrived(const rcl_wait_set_t& set) const override {
+    return set.subscriptions[place_] != nullptr || messages_.has_arrived(set);
+  }
   void take() override;
   bool wants_idle() const override { return true; }
   void idle(time_ns_t until_ns) override { resource_.caught_up(until_ns); }
 
+  const Arrival& messages_;
   Resource& resource_;
   Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
   OwnedMessage message_;
