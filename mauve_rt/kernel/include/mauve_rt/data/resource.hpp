@@ -40,7 +40,7 @@ class Notifier {
 
  private:
   static constexpr std::uint64_t kNone = 0;
-  static constexpr std::uint64_t kWaits = std::uint64_t{1} << 32U;  // and below it the word that the waiter has seen
+  static constexpr std::uint64_t kWaits = std::uint64_t{1} << 32U;  // below it the word
 
   Atomic<std::uint32_t> word_{0};
   Atomic<std::uint64_t> waiting_{kNone};
