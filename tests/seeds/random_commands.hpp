@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/base/seam/sleep.hpp"
@@ -22,15 +24,27 @@ namespace mauve::testing {
 /// What all parts of a run share. One thread runs at a time: nothing needs a lock.
 struct CommandShared {
   explicit CommandShared(seeds::Findings& all) : findings(all) {}
+  struct Release {
+    time_ns_t clock_ns, at_ns;
+  };
   struct Known {
     bool is_stopped{false};  // a stop has ended, and no start has begun since
     int executions{0};
     int core{0};  // the newest that has executed
     double input{0.0};
+    time_ns_t period_ns{0};  // 0: it has none
+    std::vector<Release> releases{};
+  };
+  /// All grids count from it. The first one is there from the beginning.
+  struct Epoch {
+    time_ns_t epoch_ns;
+    time_ns_t instant_ns{0}, began_ns{0}, ended_ns{0};
   };
   seeds::Findings& findings;
   std::array<Known, 2> components{};
-  int cores{0};  // that are configured
+  std::vector<Epoch> epochs{};
+  std::set<int> trials{};  // cores that are, or were, on probation
+  int cores{0};            // that are configured
 };
 
 class CommandCore : public Core<TestShell> {
@@ -43,9 +57,11 @@ class CommandCore : public Core<TestShell> {
     CommandShared::Known& known = shared_->components[component_];
     expect(is_ready_, "executes and is not configured");
     expect(!known.is_stopped, "executes after a stop");
-    expect(number_ >= known.core, "executes after core " + std::to_string(known.core));
+    expect(number_ >= known.core || shared_->trials.contains(known.core),
+           "executes after core " + std::to_string(known.core));
     known.core = number_;
     ++known.executions;
+    known.releases.push_back({.clock_ns = clock_ns(), .at_ns = seeds::now_ns()});
     known.input = shell().input.read().value.value;
     shell().output.write(Number{1.0});
     seeds::compute(dice_.between(0, us_to_ns(20)));
@@ -112,10 +128,11 @@ class RandomCommands {
       architecture_ = &architecture;
       deployer_ = &deployer;
       deployer.deploy();
+      shared_->epochs.push_back({.epoch_ns = deployer.epoch_ns()});
       sleep_for(dice_.between(ms_to_ns(19), ms_to_ns(22)));  // the epoch is 20 ms ahead
-      std::array<OrdinaryThread, 3> others{OrdinaryThread([this] { command(0); }),
-                                           OrdinaryThread([this] { command(1); }),
-                                           OrdinaryThread([this] { write(); })};
+      std::array<OrdinaryThread, 4> others{
+          OrdinaryThread([this] { command(0); }), OrdinaryThread([this] { command(1); }),
+          OrdinaryThread([this] { write(); }), OrdinaryThread([this] { change_beside(); })};
       Dice dice(seed_ + 3);
       for (int changes = 3 + dice.below(8); changes > 0; --changes) {
         pause(dice);
@@ -125,6 +142,7 @@ class RandomCommands {
       for (OrdinaryThread& other : others) other.join();
       if (!is_shut_down_) shut_down();
     }
+    check_grids();
     expect(shared_->cores == 0, std::to_string(shared_->cores) + " cores are not cleaned up");
     seeds::expect_threads_end(findings_, ms_to_ns(100));
   }
@@ -146,7 +164,9 @@ class RandomCommands {
       Component& component =
           architecture.add_component(name(i), new_part<Shell, TestShell>(), core(i), std::move(fsm),
                                      {.priority = 20 + 10 * dice_.below(2)});
-      component.set_property("period_ms", std::int64_t{1 + dice_.below(2)});
+      const std::int64_t period_ms = 1 + dice_.below(2);
+      component.set_property("period_ms", period_ms);
+      if (i == 0 || !is_sporadic) shared_->components[i].period_ns = ms_to_ns(period_ms);
       architecture.connect(name(i), "input", "written", "read");
     }
     architecture.connect("c0", "output", "out", "write");
@@ -187,7 +207,8 @@ class RandomCommands {
              what + ": timed out before its time: " + error.what());
     }
     const time_ns_t late_ns = took_ns() - (seeds::outcome().stalled_ns - stalled_ns) - timeout_ns;
-    expect(late_ns <= kPrompt,
+    const time_ns_t most_ns = is_shut_down_ ? kPrompt + Runner::kThreadEnd : kPrompt;
+    expect(late_ns <= most_ns,
            what + " was answered " + std::to_string(late_ns / 1000) + " us after its time");
     return is_done;
   }
@@ -225,9 +246,16 @@ class RandomCommands {
     known.is_stopped = false;
     const int before = known.executions;
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    if (!attempt("start " + name(component), ms_to_ns(1'000), [&] { deployer_->start(name(component)); }))
-      return;
-    if (dice.once_in(3)) return stop_at_once(component);
+    const bool by_change = !has_epochs_ && dice.once_in(3);  // which does not wait for the component's thread
+    const time_ns_t timeout_ns = by_change ? ms_to_ns(20) : s_to_ns(2);
+    const bool is_done = attempt("start " + name(component), timeout_ns, [&] {
+      if (!by_change) return deployer_->start(name(component));
+      Transaction transaction;
+      transaction.start(name(component));
+      deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(20), .phase_ns = 0}});
+    });
+    if (!is_done) return;
+    if (dice.once_in(by_change ? 2 : 3)) return stop_at_once(component);
     if (dice.once_in(2)) return;
     const time_ns_t until_ns = seeds::now_ns() + kPrompt;
     while (known.executions == before && !is_shut_down_ && !is_faulted(component) &&
@@ -264,18 +292,97 @@ class RandomCommands {
     for (std::size_t i = 0; i < 2; ++i) {
       if (dice.once_in(3)) continue;
       if (dice.once_in(2)) {
-        transaction.replace_core(name(i), core(i));
-        text += " core of " + name(i);
+        std::unique_ptr<CoreBase> fresh = core(i);
+        if (dice.once_in(3)) {
+          shared_->trials.insert(last_core_);
+          const time_ns_t duration_ns = dice.between(us_to_ns(500), ms_to_ns(20));
+          transaction.replace_core(name(i), std::move(fresh),
+                                   ProbationOptions{.duration_ns = duration_ns, .on_overrun = false});
+          text += " core on probation of " + name(i);
+        } else {
+          transaction.replace_core(name(i), std::move(fresh));
+          text += " core of " + name(i);
+        }
       } else {
         transaction.set_property(name(i), "gain", 0.5 * (1 + dice.below(8)));
         text += " gain of " + name(i);
       }
     }
+    const bool resynchronises = has_epochs_ && dice.once_in(3);
+    if (resynchronises) transaction.resynchronise();
     if (transaction.steps().empty()) return;
     const time_ns_t patience_ns = dice.once_in(3) ? dice.between(0, us_to_ns(900)) : ms_to_ns(20);
-    attempt(text, patience_ns, [&] {
-      deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = patience_ns, .phase_ns = 0}});
+    const time_ns_t began_ns = seeds::now_ns();
+    attempt(text + (resynchronises ? " and epoch" : ""), patience_ns, [&] {
+      const TransactionReport report =
+          deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = patience_ns, .phase_ns = 0}});
+      if (resynchronises)
+        shared_->epochs.push_back({.epoch_ns = deployer_->epoch_ns(),
+                                   .instant_ns = report.instant_ns,
+                                   .began_ns = began_ns,
+                                   .ended_ns = seeds::now_ns()});
     });
+    if (dice.once_in(3)) revert(static_cast<std::size_t>(dice.below(2)), dice);
+  }
+  /// The core before comes back at once, also where the component waits for an event that does not come.
+  void revert(std::size_t component, Dice& dice) {
+    pause(dice);
+    const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
+    const int commands = commands_[component];
+    const bool runs = architecture_->component(name(component)).task().state() == ComponentState::running;
+    bool has_timed_out = false;
+    attempt("revert " + name(component), ms_to_ns(20), [&] {
+      try {
+        deployer_->revert_probation(name(component), "as the seed wants", ms_to_ns(20));
+      } catch (const Error& error) {
+        has_timed_out = error.code() == ErrorCode::timeout;
+        throw;
+      }
+    });
+    const bool has_to = runs && commands == commands_[component] && !is_shut_down_ &&
+                        !is_faulted(component) && stalled_ns == seeds::outcome().stalled_ns;
+    expect(!has_timed_out || !has_to, name(component) + " runs, and its probation cannot be reverted");
+  }
+  /// Changes that meet those of the first client, and a configuration that waits for all of them.
+  void change_beside() {
+    Dice dice(seed_ + 5);
+    for (int changes = 2 + dice.below(6); changes > 0 && !is_shut_down_; --changes) {
+      pause(dice);
+      if (has_epochs_ || dice.once_in(3)) {
+        attempt("publish", ms_to_ns(200), [&] { architecture_->publish("written"); });
+        continue;
+      }
+      Transaction transaction;
+      for (std::size_t i = 0; i < 2; ++i) {
+        if (dice.once_in(2)) transaction.set_property(name(i), "gain", 0.25 * (1 + dice.below(8)));
+      }
+      if (transaction.steps().empty()) continue;
+      attempt("second change", ms_to_ns(20), [&] {
+        deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(20), .phase_ns = 0}});
+      });
+    }
+  }
+
+  /// Each release is on the grid of an epoch that was in force, or could be.
+  void check_grids() {
+    for (const CommandShared::Known& known : shared_->components) {
+      if (known.period_ns == 0) continue;
+      for (const CommandShared::Release& release : known.releases) {
+        std::vector<time_ns_t> epochs;
+        for (const CommandShared::Epoch& epoch : shared_->epochs) {
+          if (release.clock_ns < epoch.instant_ns) continue;
+          const bool is_sure = epoch.instant_ns != kNotMeasured ? release.at_ns > epoch.began_ns
+                                                                : release.at_ns > epoch.ended_ns;
+          if (is_sure) epochs.clear();
+          epochs.push_back(epoch.epoch_ns);
+        }
+        const bool is_on_grid = std::ranges::any_of(
+            epochs, [&](time_ns_t epoch_ns) { return (release.clock_ns - epoch_ns) % known.period_ns == 0; });
+        expect(is_on_grid, "c" + std::to_string(&known - shared_->components.data()) +
+                               ", a release at clock " + std::to_string(release.clock_ns) +
+                               ", executing at " + std::to_string(release.at_ns) + ", is not on its grid");
+      }
+    }
   }
 
   void shut_down() {
@@ -287,6 +394,7 @@ class RandomCommands {
   /// Writes in bursts; the last write of each is seen.
   void write() {
     Dice dice(seed_ + 4);
+    const bool is_slow = dice.once_in(4);
     auto& written = static_cast<SharedData<Number>&>(architecture_->resource("written"));
     for (double number = 100.0; number < 130.0 && !is_shut_down_;) {
       for (int writes = 1 + dice.below(4); writes > 0; --writes) {
@@ -306,6 +414,7 @@ class RandomCommands {
                           architecture_->component("c1").task().state() == ComponentState::running;
       expect(known.input == number || !has_to, "c1 has not seen the last write");
       pause(dice);
+      if (is_slow && dice.once_in(3)) sleep_for(dice.between(0, ms_to_ns(90)));
     }
   }
 
@@ -316,6 +425,8 @@ class RandomCommands {
   Architecture* architecture_{nullptr};
   Deployer* deployer_{nullptr};
   int last_core_{0};
+  bool has_epochs_{dice_.once_in(
+      2)};  // then one client alone makes changes: a component that is late to one keeps its grid
   std::array<int, 2> commands_{};  // begun and ended
   bool is_shut_down_{false};       // or about to be
 };
