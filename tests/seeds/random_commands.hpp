@@ -21,6 +21,8 @@
 
 namespace mauve::testing {
 
+inline constexpr time_ns_t kHang = ms_to_ns(90);
+
 /// What all parts of a run share. One thread runs at a time: nothing needs a lock.
 struct CommandShared {
   explicit CommandShared(seeds::Findings& all) : findings(all) {}
@@ -43,6 +45,7 @@ struct CommandShared {
   seeds::Findings& findings;
   std::array<Known, 2> components{};
   std::vector<Epoch> epochs{};
+  bool has_hangs{false};   // states that take up to kHang: then nothing is expected to come promptly
   std::set<int> trials{};  // cores that are, or were, on probation
   int cores{0};            // that are configured
 };
@@ -65,6 +68,7 @@ class CommandCore : public Core<TestShell> {
     known.input = shell().input.read().value.value;
     shell().output.write(Number{1.0});
     seeds::compute(dice_.between(0, us_to_ns(20)));
+    if (shared_->has_hangs && dice_.once_in(3)) sleep_for(dice_.between(ms_to_ns(1), kHang));
     expect(is_ready_, "is cleaned up while it executes");
     if (dice_.once_in(30)) throw std::runtime_error("as the seed wants");
   }
@@ -155,6 +159,7 @@ class RandomCommands {
   static std::string name(std::size_t component) { return "c" + std::to_string(component); }
 
   void declare(Architecture& architecture) {
+    shared_->has_hangs = dice_.once_in(4);
     architecture.add_resource<LatestValue<Number>>("out");
     architecture.add_resource<SharedData<Number>>("written");
     const bool is_sporadic = dice_.once_in(2);
@@ -207,7 +212,8 @@ class RandomCommands {
              what + ": timed out before its time: " + error.what());
     }
     const time_ns_t late_ns = took_ns() - (seeds::outcome().stalled_ns - stalled_ns) - timeout_ns;
-    const time_ns_t most_ns = is_shut_down_ ? kPrompt + Runner::kThreadEnd : kPrompt;
+    time_ns_t most_ns = is_shut_down_ ? kPrompt + Runner::kThreadEnd : kPrompt;
+    if (shared_->has_hangs) most_ns += kHang;  // a change that is decided waits for its participants
     expect(late_ns <= most_ns,
            what + " was answered " + std::to_string(late_ns / 1000) + " us after its time");
     return is_done;
@@ -234,12 +240,29 @@ class RandomCommands {
     }
   }
   void stop(std::size_t component, Dice& dice) {
-    const bool by_force = dice.once_in(5);
+    const bool by_force = shared_->has_hangs ? !dice.once_in(3) : dice.once_in(5);
     bool is_given_up = false;
     const bool is_done = attempt("stop " + name(component), kStop, [&] {
       is_given_up = deployer_->stop(name(component), {.timeout_ns = kStop, .force = by_force});
     });
     if (is_done && !is_given_up && !is_shut_down_) shared_->components[component].is_stopped = true;
+    if (is_done && component == 0) expect_safe(is_given_up);
+  }
+  /// The output of a component that was stopped, unless it executes again.
+  void expect_safe(bool is_given_up) {
+    const CommandShared::Known& known = shared_->components[0];
+    const int executions = known.executions;
+    ReaderState reader;
+    Number found;
+    time_ns_t time_ns = 0;
+    static_cast<LatestValue<Number>&>(architecture_->resource("out")).read.read(found, time_ns, reader);
+    if (known.executions == executions && is_at_rest(0))
+      expect(found.value == 0.0, "c0 was stopped, and has the output " + std::to_string(found.value));
+    if (is_given_up) findings_.count("given up");
+  }
+  bool is_at_rest(std::size_t component) const {
+    const ComponentState state = architecture_->component(name(component)).task().state();
+    return state == ComponentState::stopped || state == ComponentState::faulted;
   }
   void start(std::size_t component, Dice& dice) {
     CommandShared::Known& known = shared_->components[component];
@@ -256,7 +279,7 @@ class RandomCommands {
     });
     if (!is_done) return;
     if (dice.once_in(by_change ? 2 : 3)) return stop_at_once(component);
-    if (dice.once_in(2)) return;
+    if (dice.once_in(2) || shared_->has_hangs) return;
     const time_ns_t until_ns = seeds::now_ns() + kPrompt;
     while (known.executions == before && !is_shut_down_ && !is_faulted(component) &&
            seeds::now_ns() < until_ns + seeds::outcome().stalled_ns - stalled_ns)
@@ -271,7 +294,7 @@ class RandomCommands {
     const bool is_done = attempt("stop at once " + name(component), kStop,
                                  [&] { deployer_->stop(name(component), {.timeout_ns = kStop}); });
     const bool has_stalled = seeds::outcome().stalled_ns != stalled_ns;  // it may have timed out
-    expect(is_done || has_stalled || is_shut_down_ || is_faulted(component),
+    expect(is_done || has_stalled || shared_->has_hangs || is_shut_down_ || is_faulted(component),
            name(component) + " was started, and cannot be stopped");
     if (is_done && !is_shut_down_) shared_->components[component].is_stopped = true;
   }
@@ -339,7 +362,7 @@ class RandomCommands {
         throw;
       }
     });
-    const bool has_to = runs && commands == commands_[component] && !is_shut_down_ &&
+    const bool has_to = runs && !shared_->has_hangs && commands == commands_[component] && !is_shut_down_ &&
                         !is_faulted(component) && stalled_ns == seeds::outcome().stalled_ns;
     expect(!has_timed_out || !has_to, name(component) + " runs, and its probation cannot be reverted");
   }
@@ -410,7 +433,7 @@ class RandomCommands {
       };
       while (known.input != number && !is_over() && commands == commands_[1] && !is_shut_down_)
         sleep_for(us_to_ns(200));
-      const bool has_to = commands == commands_[1] && !is_shut_down_ &&
+      const bool has_to = commands == commands_[1] && !is_shut_down_ && !shared_->has_hangs &&
                           architecture_->component("c1").task().state() == ComponentState::running;
       expect(known.input == number || !has_to, "c1 has not seen the last write");
       pause(dice);
