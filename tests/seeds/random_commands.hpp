@@ -45,6 +45,7 @@ struct CommandShared {
   seeds::Findings& findings;
   std::array<Known, 2> components{};
   std::vector<Epoch> epochs{};
+  bool is_plain{false};
   bool has_hangs{false};   // states that take up to kHang: then nothing is expected to come promptly
   std::set<int> trials{};  // cores that are, or were, on probation
   int cores{0};            // that are configured
@@ -64,7 +65,7 @@ class CommandCore : public Core<TestShell> {
            "executes after core " + std::to_string(known.core));
     known.core = number_;
     ++known.executions;
-    known.releases.push_back({.clock_ns = clock_ns(), .at_ns = seeds::now_ns()});
+    if (!shared_->is_plain) known.releases.push_back({.clock_ns = clock_ns(), .at_ns = seeds::now_ns()});
     known.input = shell().input.read().value.value;
     shell().output.write(Number{1.0});
     seeds::compute(dice_.between(0, us_to_ns(20)));
@@ -120,8 +121,9 @@ struct CommandEventFsm : Fsm<TestShell, CommandCore> {
 
 class RandomCommands {
  public:
-  RandomCommands(std::uint64_t seed, seeds::Findings& findings)
-      : dice_(seed), findings_(findings), seed_(seed) {}
+  /// Plain: commands, changes and events alone, which then meet more often.
+  RandomCommands(std::uint64_t seed, seeds::Findings& findings, bool is_plain)
+      : dice_(seed), findings_(findings), seed_(seed), is_plain_(is_plain) {}
 
   void run() {
     seeds::switch_often();
@@ -132,11 +134,13 @@ class RandomCommands {
       architecture_ = &architecture;
       deployer_ = &deployer;
       deployer.deploy();
-      shared_->epochs.push_back({.epoch_ns = deployer.epoch_ns()});
+      if (!is_plain_) shared_->epochs.push_back({.epoch_ns = deployer.epoch_ns()});
       sleep_for(dice_.between(ms_to_ns(19), ms_to_ns(22)));  // the epoch is 20 ms ahead
-      std::array<OrdinaryThread, 4> others{
-          OrdinaryThread([this] { command(0); }), OrdinaryThread([this] { command(1); }),
-          OrdinaryThread([this] { write(); }), OrdinaryThread([this] { change_beside(); })};
+      std::array<OrdinaryThread, 3> others{OrdinaryThread([this] { command(0); }),
+                                           OrdinaryThread([this] { command(1); }),
+                                           OrdinaryThread([this] { write(); })};
+      OrdinaryThread beside;
+      if (!is_plain_) beside = OrdinaryThread([this] { change_beside(); });
       Dice dice(seed_ + 3);
       for (int changes = 3 + dice.below(8); changes > 0; --changes) {
         pause(dice);
@@ -144,9 +148,10 @@ class RandomCommands {
       }
       if (dice.once_in(3)) shut_down();
       for (OrdinaryThread& other : others) other.join();
+      if (beside.joinable()) beside.join();
       if (!is_shut_down_) shut_down();
     }
-    check_grids();
+    if (!is_plain_) check_grids();
     expect(shared_->cores == 0, std::to_string(shared_->cores) + " cores are not cleaned up");
     seeds::expect_threads_end(findings_, ms_to_ns(100));
   }
@@ -159,7 +164,8 @@ class RandomCommands {
   static std::string name(std::size_t component) { return "c" + std::to_string(component); }
 
   void declare(Architecture& architecture) {
-    shared_->has_hangs = dice_.once_in(4);
+    shared_->is_plain = is_plain_;
+    shared_->has_hangs = !is_plain_ && dice_.once_in(3);
     architecture.add_resource<LatestValue<Number>>("out");
     architecture.add_resource<SharedData<Number>>("written");
     const bool is_sporadic = dice_.once_in(2);
@@ -246,7 +252,7 @@ class RandomCommands {
       is_given_up = deployer_->stop(name(component), {.timeout_ns = kStop, .force = by_force});
     });
     if (is_done && !is_given_up && !is_shut_down_) shared_->components[component].is_stopped = true;
-    if (is_done && component == 0) expect_safe(is_given_up);
+    if (is_done && component == 0 && !is_plain_) expect_safe(is_given_up);
   }
   /// The output of a component that was stopped, unless it executes again.
   void expect_safe(bool is_given_up) {
@@ -269,7 +275,8 @@ class RandomCommands {
     known.is_stopped = false;
     const int before = known.executions;
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    const bool by_change = !has_epochs_ && dice.once_in(3);  // which does not wait for the component's thread
+    const bool by_change =
+        !is_plain_ && !has_epochs_ && dice.once_in(3);  // which does not wait for the component's thread
     const time_ns_t timeout_ns = by_change ? ms_to_ns(20) : s_to_ns(2);
     const bool is_done = attempt("start " + name(component), timeout_ns, [&] {
       if (!by_change) return deployer_->start(name(component));
@@ -316,7 +323,7 @@ class RandomCommands {
       if (dice.once_in(3)) continue;
       if (dice.once_in(2)) {
         std::unique_ptr<CoreBase> fresh = core(i);
-        if (dice.once_in(3)) {
+        if (!is_plain_ && dice.once_in(3)) {
           shared_->trials.insert(last_core_);
           const time_ns_t duration_ns = dice.between(us_to_ns(500), ms_to_ns(20));
           transaction.replace_core(name(i), std::move(fresh),
@@ -345,7 +352,7 @@ class RandomCommands {
                                    .began_ns = began_ns,
                                    .ended_ns = seeds::now_ns()});
     });
-    if (dice.once_in(3)) revert(static_cast<std::size_t>(dice.below(2)), dice);
+    if (!is_plain_ && dice.once_in(3)) revert(static_cast<std::size_t>(dice.below(2)), dice);
   }
   /// The core before comes back at once, also where the component waits for an event that does not come.
   void revert(std::size_t component, Dice& dice) {
@@ -417,7 +424,7 @@ class RandomCommands {
   /// Writes in bursts; the last write of each is seen.
   void write() {
     Dice dice(seed_ + 4);
-    const bool is_slow = dice.once_in(4);
+    const bool is_slow = !is_plain_ && dice.once_in(3);
     auto& written = static_cast<SharedData<Number>&>(architecture_->resource("written"));
     for (double number = 100.0; number < 130.0 && !is_shut_down_;) {
       for (int writes = 1 + dice.below(4); writes > 0; --writes) {
@@ -444,18 +451,23 @@ class RandomCommands {
   Dice dice_;
   seeds::Findings& findings_;
   std::uint64_t seed_;
+  bool is_plain_;
   std::shared_ptr<CommandShared> shared_{std::make_shared<CommandShared>(findings_)};
   Architecture* architecture_{nullptr};
   Deployer* deployer_{nullptr};
   int last_core_{0};
-  bool has_epochs_{dice_.once_in(
-      2)};  // then one client alone makes changes: a component that is late to one keeps its grid
+  // Then one client alone makes changes: a component that is late to one keeps its grid.
+  bool has_epochs_{!is_plain_ && dice_.once_in(2)};
   std::array<int, 2> commands_{};  // begun and ended
   bool is_shut_down_{false};       // or about to be
 };
 
 inline void random_commands(std::uint64_t seed, seeds::Findings& findings) {
-  RandomCommands(seed, findings).run();
+  RandomCommands(seed, findings, true).run();
+}
+/// With epochs, probations, reverts, hangs and a second client of changes.
+inline void random_meetings(std::uint64_t seed, seeds::Findings& findings) {
+  RandomCommands(seed, findings, false).run();
 }
 
 }  // namespace mauve::testing

@@ -26,6 +26,7 @@ inline constexpr std::array kScenarios = std::to_array<SeedScenario>({
     {"random_commands", random_commands},
     {"random_data", random_data},
     {"random_ends", random_ends},
+    {"random_meetings", random_meetings},
     {"random_rules", random_rules},
 });
 
