@@ -70,7 +70,8 @@ UPWARD = {
     ("run/component_fallback.cpp", "mauve_rt/architecture/plugin.hpp"),
 }
 
-# Here alone the kernel and the rules wait, wake, read a clock, make threads and have atomics of the system.
+# In the seam alone these parts wait, wake, read a clock, make threads and have atomics of the system.
+SEEDED_PARTS = KERNEL, "mauve_rt/rules", "mauve_rt/bridge"
 SEAM = f"{KERNEL}/base/seam", f"{KERNEL}/include/mauve_rt/base/seam"
 OF_THE_SEAM = re.compile(
     r"#\s*include\s*<(?:barrier|condition_variable|future|latch|linux/futex\.h|linux/membarrier\.h|mutex|poll\.h"
@@ -95,6 +96,9 @@ PLAIN_ATOMICS = {
     # Writes pages that belong to others, each with the byte that it has.
     f"{KERNEL}/base/prefault.cpp",
 }
+
+# Of the bridge these do not run under the seeded scheduler.
+BY_THE_SYSTEM = tuple(f"mauve_rt/bridge/src/{name}." for name in ("console", "node_watch", "stop_guard"))
 
 # Examples and benchmarks see the kernel as any user does: by the door and by headers of storeys.
 PUBLIC_ONLY = ("mauve_examples", "benchmarks")
@@ -173,12 +177,12 @@ def upward_includes(kernel: Path) -> list[str]:
 
 
 def past_the_seam(root: Path) -> list[str]:
-    """Return one line per place where the kernel or the rules do by themselves what the seam is for."""
+    """Return one line per place where a seeded part does by itself what the seam is for."""
     lines = []
     exceptions = set(PLAIN_ATOMICS)
-    for path in [*cpp_files(root / KERNEL), *cpp_files(root / "mauve_rt/rules")]:
+    for path in [file for part in SEEDED_PARTS for file in cpp_files(root / part)]:
         name = path.relative_to(root).as_posix()
-        if path.relative_to(root).parent.as_posix() in SEAM:
+        if path.relative_to(root).parent.as_posix() in SEAM or name.startswith(BY_THE_SYSTEM):
             continue
         for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
             code = line.partition("//")[0]

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "mauve_rt/base/seam/ordinary_thread.hpp"
 #include "mauve_rt/base/seam/sleep.hpp"
@@ -15,93 +17,16 @@
 
 #include "fixtures.hpp"
 #include "forked_run.hpp"
+#include "scenario/command_parts.hpp"
 #include "scenario/dice.hpp"
 
 namespace mauve::testing {
 
-/// What all parts of a run share. One thread runs at a time: nothing needs a lock.
-struct CommandShared {
-  explicit CommandShared(seeds::Findings& all) : findings(all) {}
-  struct Known {
-    bool is_stopped{false};  // a stop has ended, and no start has begun since
-    int executions{0};
-    int core{0};  // the newest that has executed
-    double input{0.0};
-  };
-  seeds::Findings& findings;
-  std::array<Known, 2> components{};
-  int cores{0};  // that are configured
-};
-
-class CommandCore : public Core<TestShell> {
- public:
-  CommandCore(std::shared_ptr<CommandShared> shared, std::size_t component, int number, std::uint64_t seed)
-      : shared_(std::move(shared)), component_(component), number_(number), dice_(seed) {}
-  ~CommandCore() override { expect(!is_ready_, "is destroyed before it is cleaned up"); }
-
-  void act() {
-    CommandShared::Known& known = shared_->components[component_];
-    expect(is_ready_, "executes and is not configured");
-    expect(!known.is_stopped, "executes after a stop");
-    expect(number_ >= known.core, "executes after core " + std::to_string(known.core));
-    known.core = number_;
-    ++known.executions;
-    known.input = shell().input.read().value.value;
-    shell().output.write(Number{1.0});
-    seeds::compute(dice_.between(0, us_to_ns(20)));
-    expect(is_ready_, "is cleaned up while it executes");
-    if (dice_.once_in(30)) throw std::runtime_error("as the seed wants");
-  }
-  bool configure_hook() override {
-    ++shared_->cores;
-    return is_ready_ = true;
-  }
-  void cleanup_hook() override {
-    expect(is_ready_, "is cleaned up twice");
-    --shared_->cores;
-    is_ready_ = false;
-  }
-  bool adopt(const CoreBase& /*old*/) override { return true; }
-  std::string description() const override { return "core " + std::to_string(number_); }
-
- private:
-  void expect(bool is_true, const std::string& what) const {
-    if (!is_true)
-      shared_->findings.expect(false, description() + " of c" + std::to_string(component_) + " " + what);
-  }
-
-  std::shared_ptr<CommandShared> shared_;
-  std::size_t component_;
-  int number_;
-  Dice dice_;
-  bool is_ready_{false};
-};
-
-struct CommandFsm : Fsm<TestShell, CommandCore> {
-  void define() override {
-    State& run = execution("Run", "act", &CommandCore::act);
-    State& pause = wait("Pause", ms_to_ns(shell().period_ms.value()));
-    set_initial(run);
-    next(run, pause);
-    next(pause, run);
-  }
-};
-/// act -> wait for a write to what `input` reads -> act
-struct CommandEventFsm : Fsm<TestShell, CommandCore> {
-  static constexpr time_ns_t kTimeout = ms_to_ns(200);
-  void define() override {
-    State& run = execution("Run", "act", &CommandCore::act);
-    State& pause = wait_event("Pause", shell().input, kTimeout, us_to_ns(100));
-    set_initial(run);
-    next(run, pause);
-    next(pause, run);
-  }
-};
-
 class RandomCommands {
  public:
-  RandomCommands(std::uint64_t seed, seeds::Findings& findings)
-      : dice_(seed), findings_(findings), seed_(seed) {}
+  /// Plain: commands, changes and events alone, which then meet more often.
+  RandomCommands(std::uint64_t seed, seeds::Findings& findings, bool is_plain)
+      : dice_(seed), findings_(findings), seed_(seed), is_plain_(is_plain) {}
 
   void run() {
     seeds::switch_often();
@@ -112,10 +37,13 @@ class RandomCommands {
       architecture_ = &architecture;
       deployer_ = &deployer;
       deployer.deploy();
+      if (!is_plain_) shared_->epochs.push_back({.epoch_ns = deployer.epoch_ns()});
       sleep_for(dice_.between(ms_to_ns(19), ms_to_ns(22)));  // the epoch is 20 ms ahead
       std::array<OrdinaryThread, 3> others{OrdinaryThread([this] { command(0); }),
                                            OrdinaryThread([this] { command(1); }),
                                            OrdinaryThread([this] { write(); })};
+      OrdinaryThread beside;
+      if (!is_plain_) beside = OrdinaryThread([this] { change_beside(); });
       Dice dice(seed_ + 3);
       for (int changes = 3 + dice.below(8); changes > 0; --changes) {
         pause(dice);
@@ -123,8 +51,10 @@ class RandomCommands {
       }
       if (dice.once_in(3)) shut_down();
       for (OrdinaryThread& other : others) other.join();
+      if (beside.joinable()) beside.join();
       if (!is_shut_down_) shut_down();
     }
+    if (!is_plain_) check_grids();
     expect(shared_->cores == 0, std::to_string(shared_->cores) + " cores are not cleaned up");
     seeds::expect_threads_end(findings_, ms_to_ns(100));
   }
@@ -137,6 +67,8 @@ class RandomCommands {
   static std::string name(std::size_t component) { return "c" + std::to_string(component); }
 
   void declare(Architecture& architecture) {
+    shared_->is_plain = is_plain_;
+    shared_->has_hangs = !is_plain_ && dice_.once_in(3);
     architecture.add_resource<LatestValue<Number>>("out");
     architecture.add_resource<SharedData<Number>>("written");
     const bool is_sporadic = dice_.once_in(2);
@@ -146,7 +78,9 @@ class RandomCommands {
       Component& component =
           architecture.add_component(name(i), new_part<Shell, TestShell>(), core(i), std::move(fsm),
                                      {.priority = 20 + 10 * dice_.below(2)});
-      component.set_property("period_ms", std::int64_t{1 + dice_.below(2)});
+      const std::int64_t period_ms = 1 + dice_.below(2);
+      component.set_property("period_ms", period_ms);
+      if (i == 0 || !is_sporadic) shared_->components[i].period_ns = ms_to_ns(period_ms);
       architecture.connect(name(i), "input", "written", "read");
     }
     architecture.connect("c0", "output", "out", "write");
@@ -187,7 +121,9 @@ class RandomCommands {
              what + ": timed out before its time: " + error.what());
     }
     const time_ns_t late_ns = took_ns() - (seeds::outcome().stalled_ns - stalled_ns) - timeout_ns;
-    expect(late_ns <= kPrompt,
+    time_ns_t most_ns = is_shut_down_ ? kPrompt + Runner::kThreadEnd : kPrompt;
+    if (shared_->has_hangs) most_ns += kHang;  // a change that is decided waits for its participants
+    expect(late_ns <= most_ns,
            what + " was answered " + std::to_string(late_ns / 1000) + " us after its time");
     return is_done;
   }
@@ -213,22 +149,47 @@ class RandomCommands {
     }
   }
   void stop(std::size_t component, Dice& dice) {
-    const bool by_force = dice.once_in(5);
+    const bool by_force = shared_->has_hangs ? !dice.once_in(3) : dice.once_in(5);
     bool is_given_up = false;
     const bool is_done = attempt("stop " + name(component), kStop, [&] {
       is_given_up = deployer_->stop(name(component), {.timeout_ns = kStop, .force = by_force});
     });
     if (is_done && !is_given_up && !is_shut_down_) shared_->components[component].is_stopped = true;
+    if (is_done && component == 0 && !is_plain_) expect_safe(is_given_up);
+  }
+  /// The output of a component that was stopped, unless it executes again.
+  void expect_safe(bool is_given_up) {
+    const CommandShared::Known& known = shared_->components[0];
+    const int executions = known.executions;
+    ReaderState reader;
+    Number found;
+    time_ns_t time_ns = 0;
+    static_cast<LatestValue<Number>&>(architecture_->resource("out")).read.read(found, time_ns, reader);
+    if (known.executions == executions && is_at_rest(0))
+      expect(found.value == 0.0, "c0 was stopped, and has the output " + std::to_string(found.value));
+    if (is_given_up) findings_.count("given up");
+  }
+  bool is_at_rest(std::size_t component) const {
+    const ComponentState state = architecture_->component(name(component)).task().state();
+    return state == ComponentState::stopped || state == ComponentState::faulted;
   }
   void start(std::size_t component, Dice& dice) {
     CommandShared::Known& known = shared_->components[component];
     known.is_stopped = false;
     const int before = known.executions;
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    if (!attempt("start " + name(component), ms_to_ns(1'000), [&] { deployer_->start(name(component)); }))
-      return;
-    if (dice.once_in(3)) return stop_at_once(component);
-    if (dice.once_in(2)) return;
+    const bool by_change =
+        !is_plain_ && !has_epochs_ && dice.once_in(3);  // which does not wait for the component's thread
+    const time_ns_t timeout_ns = by_change ? ms_to_ns(20) : s_to_ns(1);
+    const bool is_done = attempt("start " + name(component), timeout_ns, [&] {
+      if (!by_change) return deployer_->start(name(component));
+      Transaction transaction;
+      transaction.start(name(component));
+      deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(20), .phase_ns = 0}});
+    });
+    if (!is_done) return;
+    if (dice.once_in(by_change ? 2 : 3)) return stop_at_once(component);
+    if (dice.once_in(2) || shared_->has_hangs) return;
     const time_ns_t until_ns = seeds::now_ns() + kPrompt;
     while (known.executions == before && !is_shut_down_ && !is_faulted(component) &&
            seeds::now_ns() < until_ns + seeds::outcome().stalled_ns - stalled_ns)
@@ -243,7 +204,7 @@ class RandomCommands {
     const bool is_done = attempt("stop at once " + name(component), kStop,
                                  [&] { deployer_->stop(name(component), {.timeout_ns = kStop}); });
     const bool has_stalled = seeds::outcome().stalled_ns != stalled_ns;  // it may have timed out
-    expect(is_done || has_stalled || is_shut_down_ || is_faulted(component),
+    expect(is_done || has_stalled || shared_->has_hangs || is_shut_down_ || is_faulted(component),
            name(component) + " was started, and cannot be stopped");
     if (is_done && !is_shut_down_) shared_->components[component].is_stopped = true;
   }
@@ -264,18 +225,97 @@ class RandomCommands {
     for (std::size_t i = 0; i < 2; ++i) {
       if (dice.once_in(3)) continue;
       if (dice.once_in(2)) {
-        transaction.replace_core(name(i), core(i));
-        text += " core of " + name(i);
+        std::unique_ptr<CoreBase> fresh = core(i);
+        if (!is_plain_ && dice.once_in(3)) {
+          shared_->trials.insert(last_core_);
+          const time_ns_t duration_ns = dice.between(us_to_ns(500), ms_to_ns(20));
+          transaction.replace_core(name(i), std::move(fresh),
+                                   ProbationOptions{.duration_ns = duration_ns, .on_overrun = false});
+          text += " core on probation of " + name(i);
+        } else {
+          transaction.replace_core(name(i), std::move(fresh));
+          text += " core of " + name(i);
+        }
       } else {
         transaction.set_property(name(i), "gain", 0.5 * (1 + dice.below(8)));
         text += " gain of " + name(i);
       }
     }
+    const bool resynchronises = has_epochs_ && dice.once_in(3);
+    if (resynchronises) transaction.resynchronise();
     if (transaction.steps().empty()) return;
     const time_ns_t patience_ns = dice.once_in(3) ? dice.between(0, us_to_ns(900)) : ms_to_ns(20);
-    attempt(text, patience_ns, [&] {
-      deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = patience_ns, .phase_ns = 0}});
+    const time_ns_t began_ns = seeds::now_ns();
+    attempt(text + (resynchronises ? " and epoch" : ""), patience_ns, [&] {
+      const TransactionReport report =
+          deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = patience_ns, .phase_ns = 0}});
+      if (resynchronises)
+        shared_->epochs.push_back({.epoch_ns = deployer_->epoch_ns(),
+                                   .instant_ns = report.instant_ns,
+                                   .began_ns = began_ns,
+                                   .ended_ns = seeds::now_ns()});
     });
+    if (!is_plain_ && dice.once_in(3)) revert(static_cast<std::size_t>(dice.below(2)), dice);
+  }
+  /// The core before comes back at once, also where the component waits for an event that does not come.
+  void revert(std::size_t component, Dice& dice) {
+    pause(dice);
+    const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
+    const int commands = commands_[component];
+    const bool runs = architecture_->component(name(component)).task().state() == ComponentState::running;
+    bool has_timed_out = false;
+    attempt("revert " + name(component), ms_to_ns(20), [&] {
+      try {
+        deployer_->revert_probation(name(component), "as the seed wants", ms_to_ns(20));
+      } catch (const Error& error) {
+        has_timed_out = error.code() == ErrorCode::timeout;
+        throw;
+      }
+    });
+    const bool has_to = runs && !shared_->has_hangs && commands == commands_[component] && !is_shut_down_ &&
+                        !is_faulted(component) && stalled_ns == seeds::outcome().stalled_ns;
+    expect(!has_timed_out || !has_to, name(component) + " runs, and its probation cannot be reverted");
+  }
+  /// Changes that meet those of the first client, and a configuration that waits for all of them.
+  void change_beside() {
+    Dice dice(seed_ + 5);
+    for (int changes = 2 + dice.below(6); changes > 0 && !is_shut_down_; --changes) {
+      pause(dice);
+      if (has_epochs_ || dice.once_in(3)) {
+        attempt("publish", ms_to_ns(200), [&] { architecture_->publish("written"); });
+        continue;
+      }
+      Transaction transaction;
+      for (std::size_t i = 0; i < 2; ++i) {
+        if (dice.once_in(2)) transaction.set_property(name(i), "gain", 0.25 * (1 + dice.below(8)));
+      }
+      if (transaction.steps().empty()) continue;
+      attempt("second change", ms_to_ns(20), [&] {
+        deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(20), .phase_ns = 0}});
+      });
+    }
+  }
+
+  /// Each release is on the grid of an epoch that was in force, or could be.
+  void check_grids() {
+    for (const CommandShared::Known& known : shared_->components) {
+      if (known.period_ns == 0) continue;
+      for (const CommandShared::Release& release : known.releases) {
+        std::vector<time_ns_t> epochs;
+        for (const CommandShared::Epoch& epoch : shared_->epochs) {
+          if (release.clock_ns < epoch.instant_ns) continue;
+          const bool is_sure = epoch.instant_ns != kNotMeasured ? release.at_ns > epoch.began_ns
+                                                                : release.at_ns > epoch.ended_ns;
+          if (is_sure) epochs.clear();
+          epochs.push_back(epoch.epoch_ns);
+        }
+        const bool is_on_grid = std::ranges::any_of(
+            epochs, [&](time_ns_t epoch_ns) { return (release.clock_ns - epoch_ns) % known.period_ns == 0; });
+        expect(is_on_grid, "c" + std::to_string(&known - shared_->components.data()) +
+                               ", a release at clock " + std::to_string(release.clock_ns) +
+                               ", executing at " + std::to_string(release.at_ns) + ", is not on its grid");
+      }
+    }
   }
 
   void shut_down() {
@@ -287,6 +327,7 @@ class RandomCommands {
   /// Writes in bursts; the last write of each is seen.
   void write() {
     Dice dice(seed_ + 4);
+    const bool is_slow = !is_plain_ && dice.once_in(3);
     auto& written = static_cast<SharedData<Number>&>(architecture_->resource("written"));
     for (double number = 100.0; number < 130.0 && !is_shut_down_;) {
       for (int writes = 1 + dice.below(4); writes > 0; --writes) {
@@ -302,26 +343,34 @@ class RandomCommands {
       };
       while (known.input != number && !is_over() && commands == commands_[1] && !is_shut_down_)
         sleep_for(us_to_ns(200));
-      const bool has_to = commands == commands_[1] && !is_shut_down_ &&
+      const bool has_to = commands == commands_[1] && !is_shut_down_ && !shared_->has_hangs &&
                           architecture_->component("c1").task().state() == ComponentState::running;
       expect(known.input == number || !has_to, "c1 has not seen the last write");
       pause(dice);
+      if (is_slow && dice.once_in(3)) sleep_for(dice.between(0, ms_to_ns(90)));
     }
   }
 
   Dice dice_;
   seeds::Findings& findings_;
   std::uint64_t seed_;
+  bool is_plain_;
   std::shared_ptr<CommandShared> shared_{std::make_shared<CommandShared>(findings_)};
   Architecture* architecture_{nullptr};
   Deployer* deployer_{nullptr};
   int last_core_{0};
+  // Then one client alone makes changes: a component that is late to one keeps its grid.
+  bool has_epochs_{!is_plain_ && dice_.once_in(2)};
   std::array<int, 2> commands_{};  // begun and ended
   bool is_shut_down_{false};       // or about to be
 };
 
 inline void random_commands(std::uint64_t seed, seeds::Findings& findings) {
-  RandomCommands(seed, findings).run();
+  RandomCommands(seed, findings, true).run();
+}
+/// With epochs, probations, reverts, hangs and a second client of changes.
+inline void random_meetings(std::uint64_t seed, seeds::Findings& findings) {
+  RandomCommands(seed, findings, false).run();
 }
 
 }  // namespace mauve::testing

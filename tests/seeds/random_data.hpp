@@ -100,7 +100,7 @@ class RandomData {
                             capacity, overwrites ? WhenFull::overwrite : WhenFull::refuse);
     }
     architecture_->add_resource<EventCounter>("raises");
-    shared_->call_timeouts = {{"client0", ms_to_ns(8)}, {"client1", ms_to_ns(60)}};
+    shared_->call_timeouts = {{"client0", ms_to_ns(8)}, {"client1", ms_to_ns(150)}};
     for (const auto& [name, timeout_ns] : shared_->call_timeouts)
       architecture_->add_resource<Client<Question>>(name, timeout_ns);
     for (int i = 0; i < count; ++i) add_part(i);
@@ -350,7 +350,7 @@ class RandomData {
 
   /// Once nothing is written any more, who waits for a write has seen the last one.
   void expect_settled() {
-    pause(ms_to_ns(100));
+    pause(ms_to_ns(190));  // a call that has no answer ends after 150 ms
     for (int bursts = 6; bursts > 0 && waits_for_raises(); --bursts) {
       for (int raises = 2 + dice_.below(3); raises > 0; --raises) {
         shared_->raise([this] {

@@ -7,6 +7,7 @@
 
 #include "forked_run.hpp"
 #include "random_architecture.hpp"
+#include "random_bridge.hpp"
 #include "random_commands.hpp"
 #include "random_data.hpp"
 #include "random_ends.hpp"
@@ -21,9 +22,11 @@ struct SeedScenario {
 
 inline constexpr std::array kScenarios = std::to_array<SeedScenario>({
     {"random_architecture", random_architecture},
+    {"random_bridge", random_bridge},
     {"random_commands", random_commands},
     {"random_data", random_data},
     {"random_ends", random_ends},
+    {"random_meetings", random_meetings},
     {"random_rules", random_rules},
 });
 

@@ -2,12 +2,12 @@
 // What all bindings of a resource to ROS are: opened on a name, then attached to the resource that they serve.
 #pragma once
 
-#include <atomic>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/data/client.hpp"
 #include "mauve_rt/data/resource.hpp"
 
@@ -30,7 +30,7 @@ struct TrafficCounts {
 class TrafficCounter {
  public:
   void count(bool passed) noexcept {
-    std::atomic<std::uint64_t>& counter = passed ? passed_ : refused_;
+    Atomic<std::uint64_t>& counter = passed ? passed_ : refused_;
     counter.store(counter.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
   TrafficCounts counts() const noexcept {
@@ -39,8 +39,8 @@ class TrafficCounter {
   }
 
  private:
-  std::atomic<std::uint64_t> passed_{0};
-  std::atomic<std::uint64_t> refused_{0};
+  Atomic<std::uint64_t> passed_{0};
+  Atomic<std::uint64_t> refused_{0};
 };
 
 /// What is known of a bound topic from outside.

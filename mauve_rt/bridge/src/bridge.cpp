@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/guards.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "thread.hpp"
@@ -21,7 +22,7 @@ Bridge::~Bridge() { close(); }
 template <typename Kind, typename... Args>
 std::size_t Bridge::open(const Args&... args) {
   auto made = std::make_unique<Kind>(node_, args...);
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   const bool is_new = bindings_.emplace(opened_, std::move(made)).second;
   MAUVE_ENSURES(is_new);
   return opened_++;
@@ -44,7 +45,7 @@ std::size_t Bridge::offer(const CallSettings& settings, const std::string& offer
 void Bridge::attach(const std::vector<std::size_t>& numbers) {
   stop_receivers();  // what arrives meanwhile waits in the middleware
   try {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     for (const std::size_t number : numbers) {
       Binding& binding = *bindings_.at(number);
       binding.attach(architecture_.hold_resource(binding.resource_name()));
@@ -62,7 +63,7 @@ void Bridge::listen_for_silence(std::set<std::string> resources) {
   silent_ = std::move(resources);
   stop_receivers();
   try {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     for (const auto& [number, binding] : bindings_) {
       if (binding->is_attached()) binding->listen_for_silence(silent_.contains(binding->resource_name()));
     }
@@ -78,7 +79,7 @@ void Bridge::close(const std::vector<std::size_t>& numbers) {
   }
   stop_receivers();
   {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     for (const std::size_t number : numbers) bindings_.erase(number);
   }
   start_receivers();
@@ -88,8 +89,7 @@ void Bridge::start() {
   if (running_) return;
   running_ = true;
   ending_.store(false, std::memory_order_release);
-  sender_ = start_thread("topics_out", [this] { send_all(); });
-  place(sender_, sender_place_);
+  sender_ = start_thread("topics_out", [this] { send_all(); }, sender_place_);
   start_receivers();
 }
 
@@ -104,26 +104,26 @@ void Bridge::stop() {
 
 void Bridge::close() {
   stop();
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   bindings_.clear();
 }
 
 BridgeReport Bridge::report() {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   BridgeReport all;
   for (const auto& [number, binding] : bindings_) binding->report(all);
   return all;
 }
 
 bool Bridge::send_some() {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   bool more = false;
   for (const auto& [number, binding] : bindings_) more = (binding->is_attached() && binding->send()) || more;
   return more;
 }
 
 time_ns_t Bridge::next_look_ns() {
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   time_ns_t next = monotonic_now_ns() + kLook;
   for (const auto& [number, binding] : bindings_) {
     if (binding->is_attached()) next = std::min(next, binding->next_look_ns());

@@ -4,13 +4,13 @@
 
 #include <map>
 #include <memory>
-#include <mutex>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 
 #include "calls.hpp"
 #include "mirror.hpp"
@@ -88,8 +88,8 @@ class Bridge {
   Receiver requests_{node_, "requests_in"};  // the resource's own code runs here
   Receiver events_{node_, "topic_events"};   // few, so that waiting for messages stays cheap
   bool running_{false};
-  std::atomic<bool> ending_{false};
-  std::thread sender_;
+  Atomic<bool> ending_{false};
+  WorkerThread sender_;
 };
 
 }  // namespace mauve::bridge

@@ -4,9 +4,8 @@
 #include <rcl/graph.h>
 #include <rmw/rmw.h>
 
-#include <mutex>
-
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/guards.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "rcl_error.hpp"
@@ -73,7 +72,7 @@ void CalledService::send_request(std::uint32_t number) {
     return client_->refuse(number, CallOutcome::no_server);
   if (!request_.deserialize(serialized_)) return client_->refuse(number, CallOutcome::malformed);
   // The answer may come before this returns: it waits for the sequence number.
-  const std::lock_guard lock(mutex_);
+  const LockGuard lock(mutex_);
   number_ = number;
   if (!went_well(rcl_send_request(entity_.get(), request_.get(), &sequence_)))
     client_->refuse(number, CallOutcome::no_server);
@@ -96,7 +95,7 @@ void CalledService::take() {
   while (went_well(rcl_take_response(entity_.get(), &id, response_.get()))) {
     std::uint32_t number = 0;
     {
-      const std::lock_guard lock(mutex_);
+      const LockGuard lock(mutex_);
       if (id.sequence_number != sequence_) continue;  // of a call that was given up
       number = number_;
     }

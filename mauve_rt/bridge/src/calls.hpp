@@ -9,6 +9,7 @@
 #include <string>
 
 #include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 
 #include "binding.hpp"
 #include "owned.hpp"
@@ -109,7 +110,7 @@ class OfferedService final : public Binding, private Arrival {
   std::vector<std::byte> reply_;
   std::size_t place_{0};    // in the wait set
   TrafficCounter counter_;  // of requests
-  std::atomic<time_ns_t> longest_ns_{0};
+  Atomic<time_ns_t> longest_ns_{0};
 };
 
 }  // namespace mauve::bridge

@@ -6,7 +6,6 @@
 #include <condition_variable>
 #include <mutex>
 #include <string>
-#include <thread>
 
 #include "mauve_rt/base/time.hpp"
 
@@ -47,7 +46,7 @@ class NodeWatch {
   std::mutex mutex_;
   std::condition_variable end_;
   bool is_ending_{false};
-  std::thread thread_;
+  WorkerThread thread_;
 };
 
 }  // namespace mauve::bridge

@@ -4,16 +4,15 @@
 #include <rcl/error_handling.h>
 #include <rcutils/logging_macros.h>
 
-#include <chrono>
-#include <thread>
-
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace mauve::bridge {
 
 namespace {
 
-constexpr std::chrono::milliseconds kPauseAfterFailure{50};
+constexpr time_ns_t kPauseAfterFailure = ms_to_ns(50);
 constexpr int kLogEveryMs = 10'000;
 
 }  // namespace
@@ -37,7 +36,7 @@ Waited after_wait(rcl_ret_t outcome, const rcl_context_t& context) {
   RCUTILS_LOG_ERROR_THROTTLE_NAMED(rcutils_steady_time_now, kLogEveryMs, "bridge",
                                    "waiting for messages and requests failed, and is tried again: %s",
                                    message.c_str());
-  std::this_thread::sleep_for(kPauseAfterFailure);
+  sleep_for(kPauseAfterFailure);
   return Waited::failed;
 }
 

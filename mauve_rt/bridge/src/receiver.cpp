@@ -6,7 +6,6 @@
 #include "mauve_rt/base/contract.hpp"
 
 #include "rcl_error.hpp"
-#include "thread.hpp"
 
 namespace mauve::bridge {
 

@@ -5,11 +5,12 @@
 #include <rcl/node.h>
 #include <rcl/wait.h>
 
-#include <atomic>
-#include <thread>
 #include <vector>
 
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
+
+#include "thread.hpp"
 
 namespace mauve::bridge {
 
@@ -61,8 +62,8 @@ class Receiver {
   const char* name_;
   rcl_guard_condition_t wake_{rcl_get_zero_initialized_guard_condition()};
   std::vector<Arrival*> arrivals_;
-  std::atomic<bool> ending_{false};
-  std::thread thread_;
+  Atomic<bool> ending_{false};
+  WorkerThread thread_;
 };
 
 }  // namespace mauve::bridge

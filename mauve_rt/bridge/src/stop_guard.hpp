@@ -12,7 +12,6 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "mauve_rt/architecture/architecture.hpp"
@@ -138,7 +137,7 @@ class StopGuard {
   std::map<std::uint64_t, Waiting> transitions_;
   std::uint64_t last_number_{0};
   std::atomic<bool> ending_{false};
-  std::thread thread_;
+  WorkerThread thread_;
 };
 
 }  // namespace mauve::bridge

@@ -6,10 +6,11 @@
 #include <rcl/publisher.h>
 #include <rcl/subscription.h>
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <vector>
+
+#include "mauve_rt/base/seam/atomic.hpp"
 
 #include "receiver.hpp"
 
@@ -29,10 +30,10 @@ struct TopicTroubles {
 /// | ------ | -------------------- | ---------------------------------------- |
 /// | all    | the receiving thread | relaxed: figures that nothing depends on |
 struct TopicTroubleCounts {
-  std::atomic<std::uint64_t> deadlines_missed{0};
-  std::atomic<std::uint64_t> liveliness_lost{0};
-  std::atomic<std::uint64_t> incompatible_qos{0};
-  std::atomic<int> policy{0};
+  Atomic<std::uint64_t> deadlines_missed{0};
+  Atomic<std::uint64_t> liveliness_lost{0};
+  Atomic<std::uint64_t> incompatible_qos{0};
+  Atomic<int> policy{0};
 
   TopicTroubles read() const noexcept;
 };

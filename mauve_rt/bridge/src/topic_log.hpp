@@ -2,14 +2,14 @@
 // Messages that went through the bridge, kept for a recorder.
 #pragma once
 
-#include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <mutex>
 #include <span>
 #include <utility>
 #include <vector>
 
+#include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve::bridge {
@@ -37,7 +37,7 @@ class TopicLog {
   /// [non-rt]
   void add(std::size_t topic, time_ns_t time_ns, std::span<const std::byte> data) {
     if (!enabled_.load(std::memory_order_relaxed)) return;
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     if (bytes_ + data.size() > kMaxBytes) {
       ++dropped_;
       return;
@@ -47,22 +47,22 @@ class TopicLog {
   }
   /// What came since the last call. [non-rt]
   std::vector<LoggedMessage> take() {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     bytes_ = 0;
     return std::exchange(messages_, {});
   }
   /// Messages that found no room so far. [non-rt]
   std::uint64_t dropped() {
-    const std::lock_guard lock(mutex_);
+    const LockGuard lock(mutex_);
     return dropped_;
   }
 
  private:
-  std::atomic<bool> enabled_{false};
-  std::mutex mutex_;
-  std::vector<LoggedMessage> messages_;
-  std::size_t bytes_{0};
-  std::uint64_t dropped_{0};
+  Atomic<bool> enabled_{false};
+  Mutex mutex_;
+  std::vector<LoggedMessage> messages_ MAUVE_GUARDED_BY(mutex_);
+  std::size_t bytes_ MAUVE_GUARDED_BY(mutex_){0};
+  std::uint64_t dropped_ MAUVE_GUARDED_BY(mutex_){0};
 };
 
 }  // namespace mauve::bridge

@@ -26,7 +26,7 @@ std::vector<Arrival*> BoundTopic::arrivals(Lane lane) {
 }
 
 void BoundTopic::report(BridgeReport& report) const {
-  const std::lock_guard lock(refusal_mutex_);
+  const LockGuard lock(refusal_mutex_);
   report.topics.push_back({.resource = resource_name(),
                            .topic = full_name(),
                            .counts = counter_.counts(),
@@ -38,7 +38,7 @@ void BoundTopic::explain(std::span<const std::byte> message, time_ns_t now) {
   if (now < explained_ns_ + kExplainEvery) return;
   explained_ns_ = now;
   std::string refusal = resource().why_refused(message);
-  const std::lock_guard lock(refusal_mutex_);
+  const LockGuard lock(refusal_mutex_);
   refusal_ = std::move(refusal);
 }
 
@@ -70,8 +70,9 @@ bool OutgoingTopic::send() {
   return true;
 }
 
-ArrivalTwin::ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, Resource& resource)
-    : resource_(resource), subscription_(node, rcl_get_zero_initialized_subscription()) {
+ArrivalTwin::ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, const Arrival& messages,
+                         Resource& resource)
+    : messages_(messages), resource_(resource), subscription_(node, rcl_get_zero_initialized_subscription()) {
   rcl_subscription_options_t options = rcl_subscription_get_default_options();
   options.qos = rmw_qos_profile_sensor_data;
   options.qos.depth = 1;
@@ -116,7 +117,7 @@ std::vector<Arrival*> IncomingTopic::arrivals(Lane lane) {
 void IncomingTopic::listen_for_silence(bool on) {
   if (on == listens_) return;
   if (on && settings_.qos.reliability != RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT)
-    twin_ = std::make_unique<ArrivalTwin>(node_, settings_, resource());
+    twin_ = std::make_unique<ArrivalTwin>(node_, settings_, static_cast<const Arrival&>(*this), resource());
   if (!on) {
     twin_.reset();
     resource().caught_up(kForever);

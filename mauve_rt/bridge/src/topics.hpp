@@ -6,8 +6,9 @@
 #include <rcl/subscription.h>
 
 #include <memory>
-#include <mutex>
 #include <string>
+
+#include "mauve_rt/base/seam/mutex.hpp"
 
 #include "binding.hpp"
 #include "owned.hpp"
@@ -47,8 +48,9 @@ class BoundTopic : public Binding {
   std::size_t number_;
   TrafficCounter counter_;
   time_ns_t explained_ns_{0};  // of the thread that counts
-  mutable std::mutex refusal_mutex_;
-  std::string refusal_;  // under refusal_mutex_: that thread writes it, others look
+  mutable Mutex refusal_mutex_;
+  std::string refusal_
+      MAUVE_GUARDED_BY(refusal_mutex_);  // under refusal_mutex_: that thread writes it, others look
 };
 
 /// Publishes what is written to a resource. For one thread at a time.
@@ -73,16 +75,20 @@ class OutgoingTopic final : public BoundTopic {
 /// repaired. Taken from by the receiver's thread.
 class ArrivalTwin final : public Arrival {
  public:
-  /// The resource outlives it. Throws Error as IncomingTopic. [non-rt]
-  ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, Resource& resource);
+  /// `messages` writes them to the resource; both outlive it. Throws Error as IncomingTopic. [non-rt]
+  ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, const Arrival& messages, Resource& resource);
 
  private:
   void join(rcl_wait_set_t& set) override;
-  bool has_arrived(const rcl_wait_set_t& set) const override { return set.subscriptions[place_] != nullptr; }
+  /// Also when messages wait to be written, perhaps more of them than were taken now: then nothing is caught up.
+  bool has_arrived(const rcl_wait_set_t& set) const override {
+    return set.subscriptions[place_] != nullptr || messages_.has_arrived(set);
+  }
   void take() override;
   bool wants_idle() const override { return true; }
   void idle(time_ns_t until_ns) override { resource_.caught_up(until_ns); }
 
+  const Arrival& messages_;
   Resource& resource_;
   Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
   OwnedMessage message_;

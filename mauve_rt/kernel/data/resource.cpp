@@ -11,16 +11,20 @@
 namespace mauve {
 
 void Notifier::notify() noexcept {
-  word_.fetch_add(1, std::memory_order_seq_cst);
+  const std::uint32_t mine = word_.fetch_add(1, std::memory_order_seq_cst) + 1;
+  std::uint64_t waiter = waiting_.load(std::memory_order_seq_cst);
+  if (waiter == kNone) return;
+  // A waiter that has seen this word, or a later one, waits for the next one. The thread that notifies of that wakes the waiter.
+  const auto behind = static_cast<std::int32_t>(mine - static_cast<std::uint32_t>(waiter));
+  if (behind <= 0) return;
   // Once for all writes until it waits again: it may not run before the component that writes has come to its wait.
-  if (waiting_.load(std::memory_order_seq_cst) && waiting_.exchange(false, std::memory_order_seq_cst))
-    futex_wake_all(word_);
+  if (waiting_.compare_exchange_strong(waiter, kNone, std::memory_order_seq_cst)) futex_wake_all(word_);
 }
 
 std::uint32_t Notifier::wait(std::uint32_t seen, time_ns_t until_ns) noexcept {
-  waiting_.store(true, std::memory_order_seq_cst);
+  waiting_.store(kWaits | seen, std::memory_order_seq_cst);
   while (word_.load(std::memory_order_seq_cst) == seen && futex_wait_until(word_, seen, until_ns))
-    waiting_.store(true, std::memory_order_seq_cst);
+    waiting_.store(kWaits | seen, std::memory_order_seq_cst);
   return word();
 }
 

@@ -48,7 +48,13 @@ def check(root: Path, file: str, code: str) -> list[str]:
     ],
 )
 @pytest.mark.parametrize(
-    "file", ["kernel/run/task.cpp", "rules/engine.cpp", "rules/include/mauve_rt/rules/a.hpp"]
+    "file",
+    [
+        "kernel/run/task.cpp",
+        "rules/engine.cpp",
+        "rules/include/mauve_rt/rules/a.hpp",
+        "bridge/src/bridge.cpp",
+    ],
 )
 def test_what_goes_past_the_seam_is_found(tmp_path: Path, file: str, code: str, found: str):
     assert check(tmp_path, file, f"\n{code}\n") == [f"mauve_rt/{file}:2: {found}: {REMEDY}"]
@@ -63,7 +69,7 @@ def test_what_goes_past_the_seam_is_found(tmp_path: Path, file: str, code: str, 
         ("kernel/include/mauve_rt/base/seam/atomic.hpp", "#include <atomic>\n"),
         ("kernel/base/allocation.hpp", "#include <atomic>\nstd::atomic<int>* allocation_counter();\n"),
         ("kernel/run/task.cpp", "Atomic<int> count{0};\ncount.load(std::memory_order_relaxed);\n"),
-        ("bridge/src/thread.hpp", "#include <thread>\nstd::atomic<int> count{0};\n"),
+        ("bridge/src/node_watch.hpp", "#include <thread>\nstd::atomic<int> count{0};\n"),
     ],
 )
 def test_what_the_seam_has_passes(tmp_path: Path, file: str, code: str):

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: LGPL-3.0-or-later
-"""Write a copy of the sources of kernel and rules with each fault of the tables behind a run-time switch.
+"""Write a copy of kernel, rules and bridge with each fault of the tables behind a run-time switch.
 
     plant.py --source ROOT --to FOLDER --table mutants.yaml [--table more.yaml]
 
@@ -18,7 +18,7 @@ from typing import Any
 
 import yaml
 
-PARTS = ("mauve_rt/kernel", "mauve_rt/rules")
+PARTS = ("mauve_rt/kernel", "mauve_rt/rules", "mauve_rt/bridge")
 INDEX = "planted_mutants.inc"
 COMMENTS_AND_TEXTS = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])*\'', re.DOTALL)
 KEYS = {"number", "name", "file", "after", "original", "mutant", "fault"}

@@ -49,7 +49,12 @@ std::string reason(const Run& run) {
   for (std::string line; std::getline(findings, line);) {
     if (line.starts_with("  at ")) return line.substr(2);
   }
-  std::string line = errors.substr(0, errors.find('\n'));
+  std::istringstream lines(errors);
+  std::string line;
+  const auto is_of_stack = [&] { return line.find(")[0x") != std::string::npos; };  // a path and an address
+  while (std::getline(lines, line) && is_of_stack()) {
+  }
+  if (is_of_stack()) line.clear();
   if (line.starts_with("terminate called")) {
     const std::size_t what = errors.find("what():");
     if (what != std::string::npos) line = seeds::line_with(errors, what);

@@ -26,7 +26,8 @@ class ClientBase;
 /// | member   | written by                         | order                                                                    |
 /// | -------- | ---------------------------------- | ------------------------------------------------------------------------ |
 /// | word_    | writers                            | seq_cst with waiting_: the writer sees the waiter or the waiter the word |
-/// | waiting_ | the waiter, its waker takes it     | seq_cst: likewise; stays set when nobody woke it, which costs one wake   |
+/// | waiting_ | the waiter, its waker takes it     | seq_cst: likewise; stays set when nobody woke it, which costs one wake.  |
+/// |          |                                    | With the word: a late writer takes no waiter that has seen its write     |
 class Notifier {
  public:
   /// Wakes the waiter if one sleeps. [rt]
@@ -38,8 +39,11 @@ class Notifier {
   std::uint32_t word() const MAUVE_RT { return word_.load(std::memory_order_seq_cst); }
 
  private:
+  static constexpr std::uint64_t kNone = 0;
+  static constexpr std::uint64_t kWaits = std::uint64_t{1} << 32U;  // below it the word
+
   Atomic<std::uint32_t> word_{0};
-  Atomic<bool> waiting_{false};
+  Atomic<std::uint64_t> waiting_{kNone};
 };
 
 /// Someone told of every write to a resource, e.g. a task that waits for one.

@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Stands for <rcl/context.h>.
+#pragma once
+
+#include "simulated_rcl.h"

@@ -1,0 +1,5 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Stands for <rosidl_runtime_c/message_type_support_struct.h>.
+#pragma once
+
+#include "simulated_rcl.h"
