@@ -120,8 +120,9 @@ class Checks : protected Scene {
       const auto index = static_cast<std::size_t>(part - parts_.begin());
       if (!owns(owner, index)) continue;
       const auto component = architecture_->find_component(facts.name);
-      if (component == nullptr || architecture_->find_awaited(facts.name) != nullptr ||
-          component->task().is_left_behind())
+      const bool was_given_up =
+          component != nullptr && component->task().fault().what.find("does not end") != std::string::npos;
+      if (component == nullptr || architecture_->find_awaited(facts.name) != nullptr || was_given_up)
         continue;
       for (const ShownProperty& property : facts.parts.properties) {
         if (property.name != "gain") continue;

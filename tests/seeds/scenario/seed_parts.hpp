@@ -73,10 +73,11 @@ struct Shared {
   std::map<int, int> took_from{};      // whose state each core took over
   std::map<int, Hang> hung_cores{};    // also those that have returned
   std::set<int> hanging_components{};
-  std::set<int> hung_components{};  // also those whose cores have returned
-  std::set<int> bad_guards{};       // components whose guard misbehaved
-  int hanging{0};                   // cores
-  time_ns_t returned_ns{0};         // when the last core returned
+  std::set<int> hung_components{};   // also those whose cores have returned
+  std::set<int> bad_guards{};        // components whose guard misbehaved
+  int hanging{0};                    // cores
+  time_ns_t returned_ns{0};          // when the last core returned
+  time_ns_t returned_stalled_ns{0};  // for so long the computer had stalled by then
   std::vector<Visit> visits{};
   std::multiset<int> configured{};  // components whose hooks a client calls
 };
@@ -272,6 +273,7 @@ class SeedCore : public Core<TestShell> {
       sleep_for(ms_to_ns(1));
     --shared_->hanging;
     shared_->returned_ns = here.until_ns = seeds::now_ns();
+    shared_->returned_stalled_ns = seeds::outcome().stalled_ns;
     shared_->hanging_components.erase(component_);
   }
 
