@@ -33,7 +33,7 @@ class WorkerThread {
       error = thread_.start(settings, &run, owned.get());
     }
     if (error != 0) throw std::system_error(error, std::generic_category(), name);
-    static_cast<void>(owned.release());
+    [[maybe_unused]] const auto* taken = owned.release();  // by the thread
     is_joinable_ = true;
   }
   WorkerThread(WorkerThread&& other) noexcept
