@@ -54,8 +54,7 @@ struct Engine::Life {
   std::vector<bool> contends;  // with the rule of that number: both are about one component
   Look last{};
   Truth told{Truth::no};  // what was said of the condition last
-  bool is_due{
-      false};  // `do` is: the condition has held for long enough, and it is not known to be false since
+  bool is_due{false};   // `do` is: the condition has held for long enough, and is not known to be false since
   bool goes_on{false};  // its condition was armed by the engine before
   bool armed{false};
   bool in_effect{false};
