@@ -112,7 +112,7 @@ Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) fo
            R"(`actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it.
 
 `before`: those of the same host whose place these take, stopped: a rule that is in both, and the same,
-goes on, and what it hears in between counts. It is of no use afterwards, and as it was where this raises.)")
+goes on, and what it receives in between counts. It is of no use afterwards, and as it was where this raises.)")
       .def(
           "start", [](PyRuleRunner& self) { self.runner().start(); }, Unlocked(),
           "Begin to watch; the host is deployed.")

@@ -171,6 +171,7 @@ class Control:
     def _outcome(self, request: Request) -> Outcome:
         # The kernel's count is taken first: what changes from here on, the commit finds.
         kernel_revision = self._runtime.kernel_revision()
+        expected_revision = kernel_revision if request.expected_revision else 0
         revision, parts = self._runtime.observe()
         from_core, to_core = _replaced_core(request, parts)
         try:
@@ -179,9 +180,13 @@ class Control:
             if request.recording is not None:
                 outcome = self._order(request, request.recording)
             elif request.reload is not None:
-                outcome = self._reload(request, request.reload, parts, kernel_revision=kernel_revision)
+                with self._own_count(request):
+                    outcome = self._reload(
+                        request, request.reload, parts, expected_revision=expected_revision
+                    )
             else:
-                outcome = self._carry_out(request, parts, kernel_revision=kernel_revision)
+                with self._own_count(request):
+                    outcome = self._carry_out(request, parts, expected_revision=expected_revision)
         except RefusalError as refusal:
             outcome = Outcome(code=refusal.code, message=str(refusal))
         except MauveError as error:
@@ -194,7 +199,7 @@ class Control:
         return replace(outcome, revision=after.revision, from_core=from_core, to_core=to_core).cut()
 
     def _carry_out(
-        self, request: Request, parts: Sequence[ComponentDescription], *, kernel_revision: int
+        self, request: Request, parts: Sequence[ComponentDescription], *, expected_revision: int
     ) -> Outcome:
         check_time(request, self._runtime)
         taken = {} if request.is_direct else self._still_taken(parts)
@@ -205,9 +210,9 @@ class Control:
                 if part.name == step.target:
                     check_state(step, part)
             if not request.dry_run:
-                return self._start_or_stop(step, request, kernel_revision=kernel_revision)
+                return self._start_or_stop(step, request, expected_revision=expected_revision)
         with self._bound(plan.bound, dry_run=request.dry_run):
-            committed = self._commit(plan.transaction, request, kernel_revision=kernel_revision)
+            committed = self._commit(plan.transaction, request, expected_revision=expected_revision)
         if request.dry_run:
             words = "; ".join(str(step) for step in request.steps)
             return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
@@ -221,7 +226,7 @@ class Control:
         order: ReloadOrder,
         parts: Sequence[ComponentDescription],
         *,
-        kernel_revision: int,
+        expected_revision: int,
     ) -> Outcome:
         check_time(request, self._runtime)
         reload = Reload(self._runtime, order, parts)
@@ -237,7 +242,9 @@ class Control:
             before = {step.target: self._trials.get(step.target, _NO_TRIAL) for step in steps}
             # Before the commit: its verdict may come, and be looked at, before the commit returns.
             self._trials.update(dict.fromkeys(before, trial))
-            committed = self._commit(transaction, request, kernel_revision=kernel_revision) if steps else None
+            committed = (
+                self._commit(transaction, request, expected_revision=expected_revision) if steps else None
+            )
         except BaseException:
             self._trials.update(before)
             reload.undo()
@@ -265,31 +272,35 @@ class Control:
         there = {*self._runtime.resources(), *(part.name for part in parts)}
         return {name: taken for name, taken in self._taken.items() if name in there}
 
-    def _commit(self, transaction: Transaction, request: Request, *, kernel_revision: int) -> Committed:
+    def _commit(self, transaction: Transaction, request: Request, *, expected_revision: int) -> Committed:
         try:
             transaction.by(request.author)
             return self._runtime.host.make(
                 transaction,
                 dry_run=request.dry_run,
-                expected_revision=kernel_revision if request.expected_revision else 0,
+                expected_revision=expected_revision,
                 commit_timeout_ns=_timeout_ns(request),
                 force=request.force,
             )
         except MauveError as error:
             if error_code(error) in _CALLED_OFF:
                 check_time(request, self._runtime)  # whether it was by a deactivation
-            self._check_again(request, error)
             raise
 
-    def _check_again(self, request: Request, error: MauveError) -> None:
+    @contextmanager
+    def _own_count(self, request: Request) -> Iterator[None]:
         """Report a change that came in between in the executor's own count of revisions."""
-        if error_code(error) != "wrong_revision":
-            return
-        self._runtime.observe()
-        check_revision(request, self._runtime)
-        if getattr(error, "element", "") == "revision":
-            text = f"another change is being made at revision {request.expected_revision}"
-            raise RefusalError(Code.WRONG_REVISION, f"{text}; read ~/state, then ask again") from error
+        try:
+            yield
+        except MauveError as error:
+            if error_code(error) != "wrong_revision":
+                raise
+            self._runtime.observe()
+            check_revision(request, self._runtime)
+            if getattr(error, "element", "") == "revision":
+                text = f"another change is being made at revision {request.expected_revision}"
+                raise RefusalError(Code.WRONG_REVISION, f"{text}; read ~/state, then ask again") from error
+            raise
 
     def _order(self, request: Request, order: RecordingOrder) -> Outcome:
         check_revision(request, self._runtime)
@@ -325,22 +336,19 @@ class Control:
         only_properties = all(step.kind == "set_property" for step in steps)
         return 0 if only_properties else self._phase_timeout_ns
 
-    def _start_or_stop(self, step: Step, request: Request, *, kernel_revision: int) -> Outcome:
+    def _start_or_stop(self, step: Step, request: Request, *, expected_revision: int) -> Outcome:
         """Without a transaction: a stop stays pending after its time-out, and waits for no preparation."""
-        host, expected = self._runtime.host, kernel_revision if request.expected_revision else 0
-        try:
-            if step.kind == "stop":
-                timeout_ns = _timeout_ns(request)
-                forced = host.stop(step.target, timeout_ns, force=request.force, expected_revision=expected)
-                message = f"component '{step.target}' is stopped"
-                if forced:
-                    message += " by force: it is FAULTED, and its thread is left behind until its state ends"
-            else:
-                host.start(step.target, request.clock_ns or None, expected_revision=expected)
-                message = f"component '{step.target}' is started"
-        except MauveError as error:
-            self._check_again(request, error)
-            raise
+        host = self._runtime.host
+        if step.kind == "stop":
+            forced = host.stop(
+                step.target, _timeout_ns(request), force=request.force, expected_revision=expected_revision
+            )
+            message = f"component '{step.target}' is stopped"
+            if forced:
+                message += " by force: it is FAULTED, and its thread is left behind until its state ends"
+        else:
+            host.start(step.target, request.clock_ns or None, expected_revision=expected_revision)
+            message = f"component '{step.target}' is started"
         self._runtime.architecture.note_author(step.target, "state", request.author)
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
 

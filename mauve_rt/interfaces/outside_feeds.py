@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from mauve_rt._kernel import SignalSpec
 from mauve_rt.interfaces.decisions import STATES
@@ -16,23 +16,16 @@ DIAGNOSTICS = "/diagnostics"
 _FAULTED = next(number for number, name in STATES.items() if name == "FAULTED")
 
 
+Kept = Literal["no", "some", "all"]  # which writers of a topic keep their last message for later readers
+
+
 class Listen(Protocol):
     """How a topic is heard."""
 
     def __call__(
-        self,
-        topic: str,
-        message: Any,
-        heard: Callable[[Any], None],
-        *,
-        raw: bool,
-        latched: bool = False,
-        kept: bool = False,
+        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, kept: Kept = "no"
     ) -> None:
-        """`message`: its class; `raw`: it need not be read.
-
-        `latched`: all writers keep their last message for who comes later. `kept`: some may; it is heard.
-        """
+        """`message`: its class; `raw`: it need not be read; `kept`: a message of before is received, too."""
 
 
 class OutsideFeeds:
@@ -92,8 +85,8 @@ class OutsideFeeds:
             leaf = self._types.get((spec.target, spec.detail))
             if leaf is not None:  # else it cannot be heard here, and the rules know that
                 hear = partial(self._hear, number, spec.detail)
-                is_field = bool(spec.detail)
-                self._listen(spec.target, heard_type(file, leaf), hear, raw=not is_field, kept=is_field)
+                kept: Kept = "some" if spec.detail else "no"
+                self._listen(spec.target, heard_type(file, leaf), hear, raw=not spec.detail, kept=kept)
         elif spec.kind == "peer":
             self._open_peer(executor_name(spec.target), number)
         elif spec.kind == "diagnostic":
@@ -106,7 +99,7 @@ class OutsideFeeds:
         if name not in self._peers:
             self._peers[name] = Peer()
             hear = partial(self._hear_state, name)
-            self._listen(f"{name}/state", ArchitectureState, hear, raw=False, latched=True)
+            self._listen(f"{name}/state", ArchitectureState, hear, raw=False, kept="all")
             self._tell_peer(name)
 
     def _hear(self, number: int, field: str, message: Any) -> None:

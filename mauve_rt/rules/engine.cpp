@@ -81,11 +81,6 @@ struct Engine::Life {
   time_ns_t due_ns() const noexcept {
     return later_by(last.since_ns, last.holds() ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
   }
-  /// It owes nothing; it does from now on. What is late counts from then.
-  void hold() noexcept { is_held = true; }
-  void let_go(time_ns_t now_ns) noexcept {
-    if (std::exchange(is_held, false)) free_since_ns = now_ns;
-  }
   /// Whether there is something that it could do.
   bool may_do() const noexcept { return !in_effect && !changed_by_another && !otherwise_begun; }
   /// Whether what is in effect already is its own to undo.
@@ -315,7 +310,7 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
   }
   if (const Life* other = act == Act::do_ ? outranking(life) : nullptr) {
     life.waits_since_ns.reset();
-    life.hold();
+    life.is_held = true;
     suppress(life, act, Why::outranked, now_ns, other);
     return;
   }
@@ -331,11 +326,11 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
   }
   const bool is_late_enough = now_ns >= life.not_before_ns;
   if (!is_late_enough && life.failures == 0) {
-    life.hold();
+    life.is_held = true;
     suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
     return;
   }
-  life.let_go(now_ns);
+  if (std::exchange(life.is_held, false)) life.free_since_ns = now_ns;
   if (act == Act::do_ && want_otherwise(life, now_ns)) return;
   if (!is_late_enough || pending_) {  // in the next step, after what is pending
     life.acts_soon = act == Act::do_ && life.not_before_ns <= later_by(now_ns, kMakingReady);

@@ -59,23 +59,32 @@ RuleRunner::RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules,
     rules_.back()->applied = UINT64_MAX;
     rules_.back()->name = TraceNames::intern(rule.name);
   }
+  std::vector<std::optional<std::size_t>> same(rules_.size());  // the numbers in `before`
+  for (std::size_t i = 0; before != nullptr && i < rules_.size(); ++i) same[i] = before->find(*this, i);
   feeds_->set_topics(std::move(topics));
-  const auto same = [&](std::size_t i) { return before != nullptr ? before->find(*this, i) : std::nullopt; };
+  open_feeds(same);
+  if (before != nullptr) go_on_from(*before, same);
+}
+
+/// Of the rules that do not go on: all, or none where one cannot be.
+void RuleRunner::open_feeds(const std::vector<std::optional<std::size_t>>& same) {
   try {
     for (const auto& heard : engine_->signals()) {
-      if (!same(heard.rule)) feeds_->open(heard.spec, *heard.signal);
+      if (!same[heard.rule]) feeds_->open(heard.spec, *heard.signal);
     }
   } catch (...) {
     for (const auto& heard : engine_->signals()) feeds_->close(*heard.signal);
     throw;
   }
-  if (before == nullptr) return;
-  const bool is_same_deployment = before->epoch_ns_ == host.epoch_ns();  // else its components stood still
+}
+
+void RuleRunner::go_on_from(RuleRunner& before, const std::vector<std::optional<std::size_t>>& same) {
+  const bool is_same_deployment = before.epoch_ns_ == host_.epoch_ns();  // else its components stood still
   for (std::size_t i = 0; i < rules_.size(); ++i) {
-    if (const auto number = same(i)) engine_->go_on(i, *before->engine_, *number, is_same_deployment);
+    if (same[i]) engine_->go_on(i, *before.engine_, *same[i], is_same_deployment);
   }
-  for (const auto& heard : before->engine_->signals()) feeds_->close(*heard.signal);
-  before->feeds_ = std::make_shared<Feeds>(FeedPlace{.architecture = host.architecture(), .clock = clock_});
+  for (const auto& heard : before.engine_->signals()) feeds_->close(*heard.signal);
+  before.feeds_ = std::make_shared<Feeds>(FeedPlace{.architecture = host_.architecture(), .clock = clock_});
 }
 
 /// The number here of a rule of the other one that is the same, with the same steps.

@@ -39,8 +39,7 @@ void Signal::tell(time_ns_t time_ns, double value) noexcept {
 }
 
 void Signal::cross(time_ns_t time_ns, double value) noexcept {
-  const bool is_crossing = is_outside_ ? inner_.contains(value) : !outer_.contains(value);
-  if (!is_crossing) return;
+  if (!crosses(value, is_outside_)) return;
   is_outside_ = !is_outside_;
   (is_outside_ ? left_ : entered_).write({.time_ns = time_ns, .value = value, .count = ++crossings_});
 }

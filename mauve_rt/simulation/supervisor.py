@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from mauve_rt._kernel import Simulation
 from mauve_rt.control.requests import Request
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory
-from mauve_rt.interfaces.outside_feeds import OutsideFeeds
+from mauve_rt.interfaces.outside_feeds import Kept, OutsideFeeds
 from mauve_rt.simulation.executor import SimulatedExecutor
 from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
 from mauve_rt.supervision.decisions import Decision
@@ -60,16 +60,9 @@ class SimulatedSupervisor:
         return resolved(topic, self._executor.namespace)
 
     def _listen(
-        self,
-        topic: str,
-        message: Any,
-        heard: Callable[[Any], None],
-        *,
-        raw: bool,
-        latched: bool = False,
-        kept: bool = False,
+        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, kept: Kept = "no"
     ) -> None:
-        del message, latched, kept  # whoever listens does so from the start on
+        del message, kept  # whoever listens does so from the start on
 
         def hear(sample: Sample) -> None:
             heard(sample.data if raw else sample.message())

@@ -203,17 +203,19 @@ class RandomBridge {
   }
   /// Nothing arrives any more: what has arrived is taken soon.
   void expect_taken() {
-    const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    const time_ns_t until_ns = seeds::now_ns() + 2 * kPrompt;
-    const auto is_late = [&] {
-      return seeds::now_ns() >= until_ns + seeds::outcome().stalled_ns - stalled_ns;
-    };
-    for (const std::string& name : kIn) {
-      while (middleware_.waits_since_ns(name) != kForever && !is_late()) sleep_for(us_to_ns(200));
-      expect(middleware_.waits_since_ns(name) == kForever,
+    for (const std::string& name : kIn)
+      expect(comes_true([&] { return middleware_.waits_since_ns(name) == kForever; }, 2 * kPrompt),
              name + ": a message that has arrived is not taken");
-    }
     sleep_for(ms_to_ns(1));
+  }
+  /// Whether that is so within the time, in which the computer does not stall.
+  template <typename Condition>
+  static bool comes_true(Condition&& is_so, time_ns_t within_ns) {
+    const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
+    const time_ns_t until_ns = seeds::now_ns() + within_ns;
+    while (!is_so() && seeds::now_ns() < until_ns + seeds::outcome().stalled_ns - stalled_ns)
+      sleep_for(us_to_ns(200));
+    return is_so();
   }
 
   /// A new publisher sends soon what was written before it was there.
@@ -222,12 +224,8 @@ class RandomBridge {
     open("latest_out");
     const std::vector<CarriedMessage>& sent = middleware_.published["latest_out"];
     const std::uint64_t entity = middleware_.entity_of("latest_out");
-    const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    const time_ns_t until_ns = seeds::now_ns() + kPrompt;
     const auto is_sent = [&] { return !sent.empty() && sent.back().entity == entity; };
-    while (!is_sent() && seeds::now_ns() < until_ns + seeds::outcome().stalled_ns - stalled_ns)
-      sleep_for(us_to_ns(200));
-    expect(is_sent() || network.next("latest_out") == 0.0,
+    expect(comes_true(is_sent, kPrompt) || network.next("latest_out") == 0.0,
            "a new publisher of latest_out does not send its value");
   }
 

@@ -49,8 +49,7 @@ class BoundTopic : public Binding {
   TrafficCounter counter_;
   time_ns_t explained_ns_{0};  // of the thread that counts
   mutable Mutex refusal_mutex_;
-  std::string refusal_
-      MAUVE_GUARDED_BY(refusal_mutex_);  // under refusal_mutex_: that thread writes it, others look
+  std::string refusal_ MAUVE_GUARDED_BY(refusal_mutex_);  // that thread writes it, others look
 };
 
 /// Publishes what is written to a resource. For one thread at a time.

@@ -46,7 +46,7 @@ void Host::require_deployed() const {
 void Host::start(const std::string& component, std::optional<time_ns_t> clock_ns,
                  std::uint64_t expected_revision) {
   require_deployed();
-  architecture_.hold_component(component)->task().start(clock_ns, s_to_ns(2), expected_revision);
+  architecture_.hold_component(component)->task().start(clock_ns, Task::kStartTimeout, expected_revision);
 }
 
 void Host::stop(const std::string& component, time_ns_t timeout_ns) {

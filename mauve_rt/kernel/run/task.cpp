@@ -379,7 +379,7 @@ bool Task::withdraw_start() noexcept {
   return true;
 }
 
-/// Whoever waits goes on, whether the component has started or not.
+/// A thread that waits goes on, whether the component has started or not.
 void Task::end_wait_for_start() noexcept {
   started_.store(1, std::memory_order_release);
   futex_wake_all(started_);

@@ -94,7 +94,7 @@ class OwnRules:
                 self._begin(self._loaded)
 
     def stop(self) -> None:
-        """Nothing is done any more; all that was decided is told. The rules go on at the next start()."""
+        """Nothing is done after this; all that was decided is told. The rules go on at the next start()."""
         with self._lock:
             self._end()
 

@@ -27,7 +27,7 @@ from mauve_msgs.srv import ListComponents, Reconfigure
 from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
-from mauve_rt.interfaces.outside_feeds import OutsideFeeds
+from mauve_rt.interfaces.outside_feeds import Kept, OutsideFeeds
 from mauve_rt.node.shared.announcement import first_participant
 from mauve_rt.node.shared.background_console import init_logging_apart, last_lines
 from mauve_rt.node.shared.late_peers import LatePeers
@@ -81,17 +81,10 @@ class Supervisor:
             _LONGEST_S, watch.guarded("the rules", self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
         self._feeds = OutsideFeeds(rules_file, self._rules, listen=self._listen, now_ns=time.monotonic_ns)
-        self._listen(f"{executor}/state", ArchitectureState, self._on_state, raw=False, latched=True)
+        self._listen(f"{executor}/state", ArchitectureState, self._on_state, raw=False, kept="all")
 
     def _listen(
-        self,
-        topic: str,
-        message: Any,
-        heard: Callable[[Any], None],
-        *,
-        raw: bool,
-        latched: bool = False,
-        kept: bool = False,
+        self, topic: str, message: Any, heard: Callable[[Any], None], *, raw: bool, kept: Kept = "no"
     ) -> None:
         newest_ns = 0  # by the writers' clocks
 
@@ -99,7 +92,7 @@ class Supervisor:
             nonlocal newest_ns
             newest_ns = max(newest_ns, info["source_timestamp"])
             heard(sample)
-            if latched or self._rules.is_stirred:
+            if kept == "all" or self._rules.is_stirred:
                 self._tick()
 
         def hear_kept(sample: Any, info: Any) -> None:
@@ -116,13 +109,13 @@ class Supervisor:
             self._node.create_subscription(message, topic, taken, qos, raw=raw, event_callbacks=events)
 
         keeping = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        if latched:
+        if kept == "all":
             events = SubscriptionEventCallbacks(liveliness=partial(self._on_liveliness, topic))
             subscribe(keeping, hear, events)
             return
         # Best effort hears reliable writers too; only that something came counts.
         subscribe(QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT), hear)
-        if kept:  # of writers that do not keep their last message this one hears nothing, which is no news
+        if kept == "some":  # that it receives nothing from other writers is no news
             subscribe(keeping, hear_kept, SubscriptionEventCallbacks(use_default_callbacks=False))
 
     def _on_liveliness(self, topic: str, event: Any) -> None:

@@ -151,11 +151,7 @@ class Side {
  public:
   /// [setup]
   Side(Signal& signal, Signal::Bounds inner, Signal::Bounds outer, bool begins_outside)
-      : signal_(signal),
-        inner_(inner),
-        outer_(outer),
-        begins_outside_(begins_outside),
-        is_outside_(begins_outside) {
+      : signal_(signal), begins_outside_(begins_outside), is_outside_(begins_outside) {
     signal_.count_crossings(inner, outer, begins_outside);
   }
   /// Only the crossing to where it is now counts of those that were before. [rt]
@@ -180,7 +176,6 @@ class Side {
   std::uint64_t newest() const MAUVE_RT { return std::max(signal_.entered().count, signal_.left().count); }
 
   Signal& signal_;
-  const Signal::Bounds inner_, outer_;
   const bool begins_outside_;
   bool is_outside_;
   bool is_known_{false};

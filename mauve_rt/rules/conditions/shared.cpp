@@ -101,7 +101,7 @@ bool Side::cross() noexcept {
 
 void Side::hear(const Signal::Last& last) noexcept {
   if (is_known_ || last.count == 0) return;
-  is_known_ = begins_outside_ ? !outer_.contains(last.value) : inner_.contains(last.value);
+  is_known_ = signal_.crosses(last.value, !begins_outside_);  // it would, if it came from the other side
   if (is_known_) since_ns_ = std::max(since_ns_, last.time_ns);
 }
 

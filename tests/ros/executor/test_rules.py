@@ -389,15 +389,21 @@ def test_the_command_lists_and_loads(start: Start, files: tuple[Path, Path], dom
     assert "did you mean silence?" in error
 
 
-def test_what_cannot_be_made_ready_is_an_error_at_once(start: Start, graph: Any):
-    robot = start()
-    robot.await_said("armed")
+def rule_health(graph: Any) -> Callable[[], Any]:
+    """The newest status of the rule in /diagnostics."""
     health = graph.hear(DiagnosticArray, "/diagnostics")
 
     def status() -> Any:
         found = [each for array in health for each in array.status if each.name == f"{NODE}: rule quiet"]
         return found[-1] if found else DiagnosticStatus()
 
+    return status
+
+
+def test_what_cannot_be_made_ready_is_an_error_at_once(start: Start, graph: Any):
+    robot = start()
+    robot.await_said("armed")
+    status = rule_health(graph)
     graph.spin_until(lambda: status().message == "watching", "a rule that watches")
     assert status().level == DiagnosticStatus.OK
     # Another shell, which the safe core is not for.
@@ -419,12 +425,7 @@ def test_what_cannot_be_made_ready_is_an_error_at_once(start: Start, graph: Any)
 def test_a_rule_whose_component_does_not_run_is_an_error(start: Start, graph: Any):
     robot = start()
     robot.await_said("armed")
-    health = graph.hear(DiagnosticArray, "/diagnostics")
-
-    def status() -> Any:
-        found = [each for array in health for each in array.status if each.name == f"{NODE}: rule quiet"]
-        return found[-1] if found else DiagnosticStatus()
-
+    status = rule_health(graph)
     assert graph.ask(Stop, f"{NODE}/stop", component="counter").success
     graph.spin_until(lambda: status().level == DiagnosticStatus.ERROR, "the error")
     assert status().message == "cannot act: component counter is STOPPED"

@@ -11,6 +11,16 @@ namespace {
 
 Middleware* present = nullptr;
 
+/// Each kind of handles of a wait set, and how many were added.
+template <typename Function>
+void for_all(const rcl_wait_set_t& set, Function&& function) {
+  function(set.subscriptions, set.added[0]);
+  function(set.guard_conditions, set.added[1]);
+  function(set.clients, set.added[2]);
+  function(set.services, set.added[3]);
+  function(set.events, set.added[4]);
+}
+
 }  // namespace
 
 Middleware::Middleware(std::uint64_t seed, seeds::Findings& findings) : findings_(findings), dice_(seed) {
@@ -129,11 +139,9 @@ bool Middleware::mark(Handles* handles, std::size_t added, bool is_over) {
   return any;
 }
 bool Middleware::mark_ready(rcl_wait_set_t& set, bool is_over) {
-  bool any = mark(set.subscriptions, set.added[0], is_over);
-  any = mark(set.guard_conditions, set.added[1], is_over) || any;
-  any = mark(set.clients, set.added[2], is_over) || any;
-  any = mark(set.services, set.added[3], is_over) || any;
-  return mark(set.events, set.added[4], is_over) || any;
+  bool any = false;
+  for_all(set, [&](auto* handles, std::size_t added) { any = mark(handles, added, is_over) || any; });
+  return any;
 }
 
 namespace {
@@ -143,11 +151,7 @@ class Users {
  public:
   Users(std::map<std::uint64_t, Middleware::Entity>& entities, const rcl_wait_set_t& set)
       : entities_(entities) {
-    add(set.subscriptions, set.added[0]);
-    add(set.guard_conditions, set.added[1]);
-    add(set.clients, set.added[2]);
-    add(set.services, set.added[3]);
-    add(set.events, set.added[4]);
+    for_all(set, [this](auto* handles, std::size_t added) { add(handles, added); });
   }
   ~Users() {
     for (const std::uint64_t number : numbers_) {

@@ -26,7 +26,7 @@ class ClientBase;
 /// | member   | written by                         | order                                                                    |
 /// | -------- | ---------------------------------- | ------------------------------------------------------------------------ |
 /// | word_    | writers                            | seq_cst with waiting_: the writer sees the waiter or the waiter the word |
-/// | waiting_ | the waiter, its waker takes it     | seq_cst: likewise; stays set when nobody woke it, which costs one wake.  |
+/// | waiting_ | the waiter, its waker takes it     | seq_cst: likewise; stays set when no thread woke it, which costs one wake.|
 /// |          |                                    | With the word: a late writer takes no waiter that has seen its write     |
 class Notifier {
  public:

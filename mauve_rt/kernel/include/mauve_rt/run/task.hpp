@@ -210,11 +210,12 @@ class Task final : public Waiter {
   void start_at(time_ns_t instant_ns);
   /// Whether the thread has taken up the start that was posted last, at the instant at the latest. [non-rt]
   bool wait_started(time_ns_t until_ns) noexcept;
+  static constexpr time_ns_t kStartTimeout = s_to_ns(2);
   /// Enters the initial state at the first clock + k * period, k >= 0, later than now + 200 us (Listing 3): a clock that
   /// is still to come is the start itself; without one it is the deployment's first instant. Another fsm keeps that grid.
   /// [non-rt] Throws Error: already_running, faulted, not_configured; timeout while a commit or another command of the
   /// component lasts, or when its thread does not get to run; it is not started then. wrong_revision, as of stop().
-  void start(std::optional<time_ns_t> clock_ns = std::nullopt, time_ns_t timeout_ns = s_to_ns(2),
+  void start(std::optional<time_ns_t> clock_ns = std::nullopt, time_ns_t timeout_ns = kStartTimeout,
              std::uint64_t expected_revision = 0);
   /// Parks at the next state boundary; a wait is interrupted at once; the FSM position is given up. [non-rt]
   /// A commit that the component takes part in is called off, unless it is made: then it is taken first. Waits for no other

@@ -78,7 +78,7 @@ struct RuleFacts {
 class RuleRunner {
  public:
   /// `actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it. `before`: those of the same
-  /// host whose place these rules take, stopped: a rule that is in both, and the same, goes on, and what it hears in between
+  /// host whose place these rules take, stopped: a rule that is in both, and the same, goes on, and what it receives in between
   /// counts. It is of no use afterwards, and as it was where this throws. [setup]
   /// Throws Error as Feeds::open(); invalid_argument: a rule that cannot be so, a kind of step that there is not.
   RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, const std::vector<RuleActions>& actions,
@@ -167,6 +167,8 @@ class RuleRunner {
   void tell();
   std::string follow();
   std::optional<std::size_t> find(const RuleRunner& other, std::size_t rule) const;
+  void open_feeds(const std::vector<std::optional<std::size_t>>& same);
+  void go_on_from(RuleRunner& before, const std::vector<std::optional<std::size_t>>& same);
   void start_thread(Thread& thread, const ThreadSettings& settings, void* (*entry)(void*));
   void start_workers();
   void join_workers() noexcept;

@@ -67,7 +67,7 @@ struct SignalSpec {
 /// |                 |              |            | writer sees the bounds, or the engine sees the report (listen)    |
 /// | entered_, left_ | the writer   | the engine | Record's; written before all_: who sees a report in all_ sees     |
 /// |                 |              |            | its crossing                                                      |
-/// | inner_, outer_  | [setup]      | the writer | none: set before the signal is fed                                |
+/// | inner_, outer_  | [setup]      | both       | none: set before the signal is fed                                |
 /// | is_outside_,    | the writer,  | the writer | none                                                              |
 /// | crossings_      | [setup]      |            |                                                                   |
 /// | reported_ns_    | the writer   | the engine | release/acquire: who sees the instant sees what was told before   |
@@ -102,6 +102,11 @@ class Signal {
     outer_ = outer;
     is_outside_ = begins_outside;
     counts_crossings_ = true;
+  }
+
+  /// Whether a value crosses the bounds, seen from one side of them. [rt]
+  bool crosses(double value, bool from_outside) const MAUVE_RT {
+    return from_outside ? inner_.contains(value) : !outer_.contains(value);
   }
 
   /// By the receiver's own clock. One writer at a time. [rt]
