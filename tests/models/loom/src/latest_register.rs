@@ -38,8 +38,6 @@ pub enum Weak {
     LetGoBeforeCopy,
     /// write(): exchanges word_ before it fills front_.
     FrontAfterExchange,
-    /// A contended read takes the slot although front_ was seen newer.
-    NoWhole,
     /// reserve(): the store of table_ is relaxed.
     OrderOfTableStore,
     /// write(): the load of table_ is relaxed.
@@ -191,14 +189,6 @@ impl LatestRegister {
             return sequence;
         }
         // kCopies is 1 here: more tries are the same load again.
-        if !self.weak(Weak::NoWhole) {
-            let whole = front.sequence();
-            if self.read_slot(held) < whole {
-                if let Some(sequence) = front.load() {
-                    return sequence;
-                }
-            }
-        }
         self.read_slot(held)
     }
     /// The value in front_; 0: none, or a write came in between.

@@ -21,8 +21,6 @@ pub enum Weak {
     OrderOfWordLoads,
     /// load(): the last load of the version is relaxed.
     OrderOfLastLoad,
-    /// sequence(): the load of the version is relaxed.
-    OrderOfSequence,
     /// store(): no odd version before the words.
     NoOddVersion,
     /// load(): copies although the version is odd.
@@ -64,11 +62,6 @@ impl SequenceCell {
         }
         let order = self.order(Weak::OrderOfEvenStore, Release);
         self.version.store(2 * sequence, order);
-    }
-    pub fn sequence(&self) -> usize {
-        self.version
-            .load(self.order(Weak::OrderOfSequence, Acquire))
-            / 2
     }
     /// The value's sequence; None: a write came in between.
     pub fn load(&self) -> Option<usize> {

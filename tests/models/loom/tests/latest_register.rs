@@ -188,28 +188,6 @@ fn front_that_is_contended() {
         contended(front(Weak::None, sequence_cell::Weak::None, 2)),
     );
 }
-// One thing less, and no test fails: README.md says why.
-#[test]
-fn front_without_whole() {
-    explore(
-        Some(2),
-        contended(front(Weak::NoWhole, sequence_cell::Weak::None, 2)),
-    );
-}
-#[test]
-fn front_with_relaxed_last_load() {
-    explore(
-        Some(2),
-        contended(front(Weak::None, sequence_cell::Weak::OrderOfLastLoad, 2)),
-    );
-}
-#[test]
-fn front_with_relaxed_sequence() {
-    explore(
-        Some(2),
-        contended(front(Weak::None, sequence_cell::Weak::OrderOfSequence, 2)),
-    );
-}
 #[test]
 fn growth_by_one_reader() {
     explore(Some(2), growth(growing(Weak::None)));
@@ -238,7 +216,7 @@ twins! {
     let_go_before_copy: one_reader(slots(Weak::LetGoBeforeCopy, 1)), None => Fault::Race;
     front_after_exchange: two_readers(front(Weak::FrontAfterExchange, sequence_cell::Weak::None, 2)), Some(2) => BACK;
     order_of_odd_store: contended(front(Weak::None, sequence_cell::Weak::OrderOfOddStore, 2)), Some(2) => BACK;
-    order_of_last_load_without_whole: contended(front(Weak::NoWhole, sequence_cell::Weak::OrderOfLastLoad, 2)), Some(2) => BACK;
+    order_of_last_load: contended(front(Weak::None, sequence_cell::Weak::OrderOfLastLoad, 2)), Some(2) => BACK;
     look_after_read_goes_back: look_after_read(front(Weak::None, sequence_cell::Weak::None, 1)), Some(2) => BACK;
     order_of_table_store: growth(growing(Weak::OrderOfTableStore)), Some(2) => Fault::Race;
     order_of_writers_table: growth(growing(Weak::OrderOfWritersTable)), Some(2) => Fault::Race;
