@@ -11,7 +11,7 @@ from compiled_plugins import PLUGINS, compile_source, link
 # By source, the macros that it looks at: a variant compiles anew what these change.
 MACROS = {
     "reload_tests_values": ("STEP", "GAIN", "CRASH", "HANG", "MISSING"),
-    "reload_tests_types": ("OTHER_LAYOUT", "MAUVE_RT_VERSION"),
+    "reload_tests_types": ("OTHER_LAYOUT",),
     "reload_tests": ("OTHER_", "WITHOUT_", "THROWS", "NEW_CORE", "MAUVE_RT_VERSION"),
 }
 PYTHON_CORE = """\
