@@ -1,7 +1,6 @@
 """Small files that claim to be large: every verb ends, in little memory, with one line or a good result."""
 
 import re
-import resource
 import struct
 import subprocess
 import sys
@@ -34,34 +33,62 @@ from mauve_rt.trace.reading.reader import open_trace
 
 ADDRESS_SPACE = 2 << 30
 NAMES = "mauve_msgs/msg/TraceNames"
+# Imports by a good bag what all verbs need. Then a child runs the verbs for each bag, in so many addresses.
 VERBS = """
-import sys
+import contextlib, os, resource, sys, traceback
 from mauve_rt.cli.main import main
-bag = sys.argv[1]
-for words in (["trace", "info"], ["trace", "check"], ["trace", "stats"], ["trace", "repair"], ["report"],
-              ["trace", "export", "--format", "csv"]):
-    if words[-1] in ("csv", "report"):
-        words += ["--out", f"{bag}.{words[-1]}.html"]
-    words.insert(2 if words[0] == "trace" else 1, bag)
-    print("VERB", words[:2], main(words), flush=True)
+
+def run_verbs(bag):
+    for words in (["trace", "info"], ["trace", "check"], ["trace", "stats"], ["trace", "repair"], ["report"],
+                  ["trace", "export", "--format", "csv"]):
+        if words[-1] in ("csv", "report"):
+            words += ["--out", f"{bag}.{words[-1]}.html"]
+        words.insert(2 if words[0] == "trace" else 1, bag)
+        print("VERB", words[:2], main(words), flush=True)
+
+def run_child(bag, size):
+    resource.setrlimit(resource.RLIMIT_AS, (size, size))
+    for number, name in ((1, "out"), (2, "err")):
+        os.dup2(os.open(f"{bag}.{name}", os.O_WRONLY | os.O_CREAT | os.O_TRUNC), number)
+    try:
+        run_verbs(bag)
+    except BaseException:
+        traceback.print_exc()
+        os._exit(1)
+    os._exit(0)
+
+size, good = int(sys.argv[1]), sys.argv[2]
+with contextlib.redirect_stdout(sys.stderr):
+    run_verbs(good)
+for line in sys.stdin:
+    child = os.fork() or run_child(line.rstrip(), size)
+    print(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), flush=True)
 """
 
 
-def run(bag: Path) -> tuple[list[int], str]:
+@pytest.fixture(scope="module")
+def verbs(tmp_path_factory: pytest.TempPathFactory) -> Iterator[subprocess.Popen[str]]:
+    """The process that runs all verbs."""
+    good = tmp_path_factory.mktemp("good") / "bag"
+    record_small_bag(good)
+    command = [sys.executable, "-c", VERBS, str(ADDRESS_SPACE), str(good)]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
+        yield process
+        process.communicate()
+
+
+def run(verbs: subprocess.Popen[str], bag: Path) -> tuple[list[int], str]:
     """The exit status of every verb, and what they wrote to stderr, in 2 GB of addresses."""
-    limits = (ADDRESS_SPACE, ADDRESS_SPACE)
-    done = subprocess.run(
-        [sys.executable, "-c", VERBS, str(bag)],
-        capture_output=True,
-        text=True,
-        check=False,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, limits),
-    )
-    assert "Traceback" not in done.stderr, done.stderr
-    assert done.returncode == 0, done.stderr
-    told = [line for line in done.stdout.splitlines() if line.startswith("VERB")]
+    assert verbs.stdin is not None
+    assert verbs.stdout is not None
+    print(bag, file=verbs.stdin, flush=True)
+    status = verbs.stdout.readline()
+    output, errors = (Path(f"{bag}.{name}").read_text("utf-8") for name in ("out", "err"))
+    assert "Traceback" not in errors, errors
+    assert status == "0\n", errors
+    told = [line for line in output.splitlines() if line.startswith("VERB")]
     assert len(told) == 6
-    return [int(line.rsplit(" ", 1)[1]) for line in told], done.stderr
+    return [int(line.rsplit(" ", 1)[1]) for line in told], errors
 
 
 def zstd_zeros(size: int) -> bytes:
@@ -243,13 +270,15 @@ def file_of(*records: McapRecord) -> bytes:
 
 
 @pytest.mark.parametrize("make", MAKERS, ids=lambda make: make.__name__)
-def test_a_bomb_of_a_file(tmp_path: Path, make: Callable[[], Iterator[McapRecord]]):
+def test_a_bomb_of_a_file(
+    verbs: subprocess.Popen[str], tmp_path: Path, make: Callable[[], Iterator[McapRecord]]
+):
     bag = tmp_path / "bag"
     bag.mkdir()
     content = file_of(*make())
     assert len(content) < 400_000
     (bag / "bag_0.mcap").write_bytes(content)
-    statuses, errors = run(bag)
+    statuses, errors = run(verbs, bag)
     assert set(statuses) <= {0, 1, 2}
     assert 2 in statuses  # there is no trace in it
     assert all(line.startswith("mauve: ") for line in errors.splitlines()), errors
@@ -281,10 +310,10 @@ def test_what_its_definitions_make_of_a_message_is_told(
         open_trace(tmp_path)
 
 
-def test_what_would_be_too_much_is_not_cut_off_by_a_repair(tmp_path: Path):
+def test_what_would_be_too_much_is_not_cut_off_by_a_repair(verbs: subprocess.Popen[str], tmp_path: Path):
     bag = tmp_path / "bag_0.mcap"
     bag.write_bytes(content := file_of(*unpacks_to_gigabytes()))
-    statuses, errors = run(bag)
+    statuses, errors = run(verbs, bag)
     assert statuses == [2] * 6
     assert errors.count("it is not read, for so little can be made to take all memory") == 6
     assert bag.read_bytes() == content
@@ -320,9 +349,9 @@ ALIASES = "a0: &a0 [x, x]\n" + "".join(f"a{n}: &a{n} [*a{n - 1}, *a{n - 1}]\n" f
     ],
     ids=["aliases", "deep", "types", "ff", "nul", "utf16", "empty"],
 )
-def test_a_bomb_of_metadata(tmp_path: Path, metadata: bytes):
+def test_a_bomb_of_metadata(verbs: subprocess.Popen[str], tmp_path: Path, metadata: bytes):
     bag = tmp_path / "bag"
     record_small_bag(bag)
     (bag / "metadata.yaml").write_bytes(metadata)
-    statuses, errors = run(bag)
+    statuses, errors = run(verbs, bag)
     assert statuses == [0, 1, 0, 0, 0, 0], errors
