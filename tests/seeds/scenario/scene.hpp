@@ -93,8 +93,8 @@ class Scene {
     time_ns_t took_ns = ended_ns - began_ns - (excuses_ns() - excused_ns);
     if (shared_->hanging == 0 && (alone == nullptr || alone->is_sole())) {
       longest_ns = prompt_ns;
-      const time_ns_t stalled_ns = seeds::outcome().stalled_ns - shared_->returned_stalled_ns;
-      took_ns = std::min(took_ns, ended_ns - shared_->returned_ns - stalled_ns);
+      const time_ns_t excuses_since_ns = excuses_ns() - shared_->returned_excuses_ns;
+      took_ns = std::min(took_ns, ended_ns - shared_->returned_ns - excuses_since_ns);
     } else if (!shared_->hung_cores.empty()) {
       longest_ns += kCleanup;
     }

@@ -72,12 +72,12 @@ struct Shared {
   std::map<int, std::string> cores{};  // alive
   std::map<int, int> took_from{};      // whose state each core took over
   std::map<int, Hang> hung_cores{};    // also those that have returned
-  std::set<int> hanging_components{};
+  std::multiset<int> hanging_components{};  // once for each core of theirs that hangs
   std::set<int> hung_components{};   // also those whose cores have returned
   std::set<int> bad_guards{};        // components whose guard misbehaved
   int hanging{0};                    // cores
   time_ns_t returned_ns{0};          // when the last core returned
-  time_ns_t returned_stalled_ns{0};  // for so long the computer had stalled by then
+  time_ns_t returned_excuses_ns{0};  // stalls and slowness before that
   std::vector<Visit> visits{};
   std::multiset<int> configured{};  // components whose hooks a client calls
 };
@@ -263,7 +263,7 @@ class SeedCore : public Core<TestShell> {
                                             .from_ns = seeds::now_ns(),
                                             .is_in_state = manner_.hook == Hook::state})
                      .first->second;
-    shared_->hanging_components.insert(component_);
+    const auto hanging = shared_->hanging_components.insert(component_);
     shared_->hung_components.insert(component_);
     const int let_go = shared_->let_go;
     const time_ns_t until_ns =
@@ -273,8 +273,8 @@ class SeedCore : public Core<TestShell> {
       sleep_for(ms_to_ns(1));
     --shared_->hanging;
     shared_->returned_ns = here.until_ns = seeds::now_ns();
-    shared_->returned_stalled_ns = seeds::outcome().stalled_ns;
-    shared_->hanging_components.erase(component_);
+    shared_->returned_excuses_ns = seeds::outcome().stalled_ns + shared_->slow_ns;
+    shared_->hanging_components.erase(hanging);
   }
 
   std::shared_ptr<Shared> shared_;
