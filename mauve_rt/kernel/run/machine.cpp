@@ -277,12 +277,21 @@ time_ns_t Machine::earliest_excess_ns() const noexcept {
 }
 
 std::int64_t Machine::skip_lost(time_ns_t since_ns, time_ns_t now_ns) noexcept {
-  const time_ns_t period = grid().period_ns;
-  const time_ns_t late = now_ns - clock_ns();
-  if (!event_settled_ || period == 0 || late < period || since_ns - clock_ns() >= period) return 0;
+  take_event();  // one that came meanwhile came before the timeout, or in its place
+  const State* const wait = present_wait();
+  const bool is_for_event = wait != nullptr && wait->event != nullptr;
+  const time_ns_t period = is_for_event ? wait->duration_ns : grid().period_ns;
+  const time_ns_t due = due_ns();
+  const time_ns_t late = now_ns - due;
+  if (period == 0 || late < period || since_ns - due >= period) return 0;
+  if (is_for_event) {
+    set_clock_ns(now_ns);  // no grid to keep, as after an overrun
+    event_settled_ = true;
+    return late / period;
+  }
   const std::int64_t lost = (late + period - 1) / period;
   MAUVE_AUDIT(lost > 0);
-  set_clock_ns(clock_ns() + lost * period);
+  set_clock_ns(due + lost * period);
   return lost;
 }
 

@@ -231,6 +231,7 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   const bool goes_on = !has_timed_out && !stops && machine_.is_started();
   // In adopt and take: they are no overrun of the component. Counted by what lies between the pending instant and the release.
   const std::int64_t lost = goes_on ? machine_.skip_lost(began_ns, participant.armed_ns) : 0;
+  if (participant.period_ns == 0) participant.lost += lost;  // a sporadic one has no instants to count there
   participant.resumes_ns = due_ns();
   if (was_started) machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
   if (stops && !has_timed_out) park_stopped();

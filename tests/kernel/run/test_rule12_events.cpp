@@ -274,8 +274,76 @@ class Rule12Threads : public Deployed {
     architecture.connect("c", "input", "x", "read");
     return component;
   }
+  /// Deploys a listener with this timeout, and puts in a core whose adopt does this.
+  Component& change_in_adopt(time_ns_t timeout_ns, std::function<bool()> adopt) {
+    Component& component = add_free(architecture, "c", sporadic(timeout_ns, 0, us_to_ns(1)), {.cpus = {0}});
+    architecture.connect("c", "input", "x", "read");
+    deploy();
+    wait_runs(component, 1);
+    auto fresh = std::make_unique<AdoptingCore>(std::move(adopt));
+    fresh->instants.reserve(100);
+    Transaction change;
+    change.replace_core("c", std::move(fresh));
+    try {
+      report = deployer.commit(std::move(change), {.timeouts = {.commit_ns = s_to_ns(10)}}).steps.front();
+    } catch (const Error& error) {
+      EXPECT_EQ(ErrorCode::adopt_refused, error.code()) << error.what();
+    }
+    return component;
+  }
+
+  struct AdoptingCore : TestCore {
+    explicit AdoptingCore(std::function<bool()> adopt) : adopt_(std::move(adopt)) {}
+    bool adopt(const CoreBase& /*old*/) override { return adopt_(); }
+
+   private:
+    std::function<bool()> adopt_;
+  };
+
+  StepReport report;
   SharedData<Number>& x = architecture.add_resource<SharedData<Number>>("x");
 };
+
+/// An adopt in which an event comes, and then the timeout passes.
+class Rule12Adopt : public Rule12Threads, public ::testing::WithParamInterface<bool> {};
+INSTANTIATE_TEST_SUITE_P(All, Rule12Adopt, ::testing::Bool(),
+                         [](const auto& tested) { return std::string(tested.param ? "Agrees" : "Refuses"); });
+
+TEST_P(Rule12Adopt, AnEventInItEndsTheWaitAtItsTime) {
+  time_ns_t event_ns = 0;
+  Component& component = change_in_adopt(ms_to_ns(120), [&, agrees = GetParam()] {
+    sleep_for(ms_to_ns(70));
+    event_ns = monotonic_now_ns();
+    x.write.write({1.0}, event_ns);
+    sleep_for(ms_to_ns(70));
+    return agrees;
+  });
+  wait_runs(component, GetParam() ? 2 : 3);
+  deployer.shutdown();
+  const auto& instants = core(component).instants;
+  const std::size_t first = GetParam() ? 0 : 1;
+  EXPECT_EQ(event_ns, instants[first]);
+  EXPECT_EQ(event_ns + ms_to_ns(120), instants[first + 1]) << "the timeout counts from there";
+}
+
+TEST_P(Rule12Adopt, TimeoutsThatPassInItAreMissedAndAreNoOverruns) {
+  time_ns_t end_ns = 0;
+  Component& component = change_in_adopt(ms_to_ns(40), [&, agrees = GetParam()] {
+    sleep_for(ms_to_ns(150));
+    end_ns = monotonic_now_ns();
+    return agrees;
+  });
+  wait_runs(component, GetParam() ? 2 : 3);
+  deployer.shutdown();
+  const auto& instants = core(component).instants;
+  const std::size_t first = GetParam() ? 0 : 1;
+  EXPECT_GE(instants[first], end_ns);
+  EXPECT_EQ(ms_to_ns(40), instants[first + 1] - instants[first]);
+  EXPECT_EQ(0U, component.task().statistics().overruns);
+  if (GetParam()) {
+    EXPECT_GE(report.missed_releases, 2);
+  }
+}
 
 TEST_F(Rule12Threads, NoWriteOfAnOrdinaryThreadIsLost) {
   Component& component = add_listener();

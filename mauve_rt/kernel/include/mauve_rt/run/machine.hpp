@@ -160,7 +160,7 @@ class Machine {
   time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
   /// Instants that passed since then are skipped whatever the overrun policy; returns how many. One that has passed by less
   /// than a period is released late, as after any wait. One that was over a period late by then is the component's own overrun.
-  /// [rt]
+  /// In a wait for an event an event that has come ends the wait; the timeout counts as the period, and the wait ends now. [rt]
   std::int64_t skip_lost(time_ns_t since_ns, time_ns_t now_ns) MAUVE_RT;
   /// Executes at no clock before this one any more: T of a change that it has taken. [rt]
   void change_at(time_ns_t instant_ns) MAUVE_RT;
