@@ -252,6 +252,12 @@ std::shared_ptr<Component> Architecture::find_awaited(const std::string& name) c
   return nullptr;
 }
 
+bool Architecture::awaits_parts(const std::string& name) const {
+  const LockGuard lock(open_mutex_);
+  return std::any_of(open_.begin(), open_.end(),
+                     [&name](const auto& change) { return change->awaits_parts(name); });
+}
+
 bool Architecture::call_off_preparation(const std::string& target) const {
   const LockGuard lock(open_mutex_);
   return std::any_of(open_.begin(), open_.end(), [&](const auto& change) {

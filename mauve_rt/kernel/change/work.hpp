@@ -77,6 +77,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   bool is_under_way() const noexcept override;
   void tell(std::vector<OpenChangeFacts>& all) const override;
   std::shared_ptr<Component> find_awaited(const std::string& component) const override;
+  bool awaits_parts(const std::string& component) const override;
   bool is_about(const std::string& target) const noexcept override;
   bool is_overdue() const override;
   bool call_off_preparation() override;
@@ -220,6 +221,9 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   };
   Preparation preparation_;
   bool is_prepared_{false};    // for a prepared transaction, which lets go of it if it is not made
+  /// Of touched_ the one of that name that has yet to take the change that is made; its size: there is none. [non-rt]
+  std::size_t awaited_place(const std::string& component) const MAUVE_REQUIRES(facts_mutex_);
+
   mutable Mutex facts_mutex_;  // for a moment: no hook, and no other lock
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;

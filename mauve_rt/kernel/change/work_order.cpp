@@ -358,13 +358,24 @@ void TransactionCommit::Work::tell(std::vector<OpenChangeFacts>& all) const {
   all.push_back(std::move(facts));
 }
 
+std::size_t TransactionCommit::Work::awaited_place(const std::string& component) const {
+  if (commit_ == nullptr || !commit_->look().is_closed()) return touched_.size();
+  for (std::size_t i = 0; i < touched_.size(); ++i) {
+    if (touched_[i]->name() == component && !commit_->participants()[i].has_passed()) return i;
+  }
+  return touched_.size();
+}
+
 std::shared_ptr<Component> TransactionCommit::Work::find_awaited(const std::string& component) const {
   const LockGuard lock(facts_mutex_);
-  if (commit_ == nullptr || !commit_->look().is_closed()) return nullptr;
-  for (std::size_t i = 0; i < touched_.size(); ++i) {
-    if (touched_[i]->name() == component && !commit_->participants()[i].has_passed()) return touched_[i];
-  }
-  return nullptr;
+  const std::size_t place = awaited_place(component);
+  return place != touched_.size() ? touched_[place] : nullptr;
+}
+
+bool TransactionCommit::Work::awaits_parts(const std::string& component) const {
+  const LockGuard lock(facts_mutex_);
+  const std::size_t place = awaited_place(component);
+  return place != touched_.size() && commit_->participants()[place].replaces_parts;
 }
 
 const char* to_string(OpenChangePhase phase) noexcept {

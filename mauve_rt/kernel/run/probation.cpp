@@ -346,7 +346,9 @@ ProbationRecord Probation::record() const {
   if (now == kRunning && reverts_hang() && component_.task().is_given_up_on_probation()) {
     record.verdict = ProbationVerdict::reverted;
     record.cause = ProbationCause::fault;
-    record.reason = component_.task().fault().what + "; the old core goes in when it ends";
+    const LockGuard lock(request_mutex_);
+    record.reason = component_.task().fault().what + "; the old core " +
+                    (left_out_.empty() ? "goes in when it ends" : "does not go on: " + left_out_);
   }
   if (now < kConcluded) return record;
   record.cause = cause_;

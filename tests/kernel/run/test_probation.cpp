@@ -780,6 +780,87 @@ TEST_F(ProbationHangs, AStopThatIsPendingIsCarriedOut) {
   doors->open = true;
 }
 
+/// Of a change that waits in the component's slot: the architecture describes that one.
+class ProbationHangsInAChange : public ProbationHangs, public ::testing::WithParamInterface<bool> {
+ protected:
+  ~ProbationHangsInAChange() override {
+    doors->open = agrees->open = true;
+    requester.join();
+  }
+
+  /// The core on probation hangs after its component has agreed; then the change is made.
+  void make(bool replaces_core) {
+    deploy();
+    wait_seen(*old_seen, 2);
+    seen = put_in(
+        [this](TrialCore&, int) {
+          if (is_to_hang) doors->pass();
+        },
+        {.duration_ns = s_to_ns(10)});
+    wait_seen(*seen, 2);
+    struct AdoptingCore : TestCore {
+      explicit AdoptingCore(std::shared_ptr<Doors> at) : doors(std::move(at)) {}
+      bool adopt(const CoreBase& /*old*/) override {
+        doors->pass();
+        return true;
+      }
+      std::shared_ptr<Doors> doors;
+    };
+    Transaction both;
+    both.replace_core("other", std::make_unique<AdoptingCore>(agrees));
+    both.set_property("c", "gain", 2.0);
+    if (replaces_core) {
+      auto next = std::make_unique<TrialCore>();
+      next->set_implementation("t/Next");
+      both.replace_core("c", std::move(next));
+    }
+    requester = std::thread([this, change = std::move(both)]() mutable {
+      (*host).commit(std::move(change), {.timeouts = {.commit_ns = s_to_ns(2), .phase_ns = 0}});
+    });
+    wait_until([&] { return agrees->entered.load(); }, "the adopt of the other component");
+    wait_seen(*seen, seen->runs + 5);  // it has agreed by then
+    is_to_hang = true;
+    wait_until([&] { return doors->entered.load(); }, "the long state");
+    const std::uint64_t revision = architecture.revision();
+    agrees->open = true;
+    wait_until([&] { return architecture.revision() != revision; }, "the change");
+  }
+
+  const std::shared_ptr<Doors> agrees{std::make_shared<Doors>()};
+  std::atomic<bool> is_to_hang{false};
+  std::thread requester;
+};
+INSTANTIATE_TEST_SUITE_P(All, ProbationHangsInAChange, ::testing::Bool(), [](const auto& tested) {
+  return std::string(tested.param ? "OfTheCore" : "OfAProperty");
+});
+
+TEST_P(ProbationHangsInAChange, TheDecidedChangeIsNotPassedOver) {
+  add_trial("c", kSettings);
+  add("other", 1);
+  make(GetParam());
+  const auto component = architecture.hold_component("c");
+  const auto is_left_out = [&] {
+    settle();
+    const auto records = (*host).probations();
+    const std::string reason = records.empty() ? "" : records.back().reason;
+    return reason.find("does not go on") != std::string::npos ||
+           reason.find("another change replaced") != std::string::npos;
+  };
+  wait_until(is_left_out, "the hang to be found");
+  EXPECT_EQ(component, architecture.hold_component("c")) << "the old core does not come back";
+  EXPECT_EQ(component, architecture.find_awaited("c")) << "it is late";
+  EXPECT_EQ(ComponentState::faulted, component->task().state());
+  EXPECT_EQ(GetParam() ? Verdict::inconclusive : Verdict::reverted, record().verdict);
+  doors->open = true;
+  wait_until([&] { return component->task().is_parked(); }, "the end of the state");
+  settle();
+  EXPECT_EQ(ComponentState::faulted, component->task().state());
+  EXPECT_EQ(GetParam() ? "t/Next" : "t/Old", component->core_implementation());
+  EXPECT_EQ(2.0, component->shell_as<TestShell>().gain.value());
+  EXPECT_EQ(GetParam() ? Verdict::inconclusive : Verdict::reverted, record().verdict);
+  wait_cleaned(*seen);
+}
+
 TEST_F(ProbationHangs, TheOldCoreGoesInAtTheEndOfTheStateWhereNoOtherShellCanBeMade) {
   Component& component = add_trial("c", kSettings);
   component.shell().set_factory({});

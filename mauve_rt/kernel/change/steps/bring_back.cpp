@@ -15,6 +15,15 @@ std::unique_ptr<Part> another(const std::string& component, const Part& part) {
               {.component = component, .element = part.description()});
 }
 
+/// The change was decided for the component that hangs, and its thread takes the change when the state ends: the component is late. New
+/// parts of the change end the probation.
+void require_no_decided_change(Draft& draft, const std::shared_ptr<Component>& hung, Probation& probation) {
+  if (draft.architecture().find_awaited(hung->name()) != hung) return;
+  if (draft.architecture().awaits_parts(hung->name())) probation.conclude(ProbationCause::replaced);
+  throw Error(ErrorCode::wrong_revision, "the component has yet to take a change that is made",
+              {.component = hung->name(), .remedy = "remove the component and add it anew, in one transaction"});
+}
+
 }  // namespace
 
 constexpr StepKind steps::bring_back{
@@ -29,6 +38,7 @@ constexpr StepKind steps::bring_back{
                     {.component = step.target});
       }
       const Wires wires = draft.touch(step.target).wires;
+      require_no_decided_change(draft, hung, *probation);
       draft.remove_component(step.target);
       DraftComponent& added = draft.add_component(step.target, hung->task().settings());
       Component& component = *added.component;

@@ -194,6 +194,8 @@ class Architecture final : public Configurable {
   /// The component for which a change that is made waits, also one that the change removes; nullptr: no change waits for a
   /// component of that name. Waits as open_changes(). [non-rt]
   std::shared_ptr<Component> find_awaited(const std::string& name) const;
+  /// Whether such a change gives the component new parts. Waits as open_changes(). [non-rt]
+  bool awaits_parts(const std::string& name) const;
 
   ChangeSignal& changes() noexcept { return changes_; }
   /// Who changed what since the file or program made it. A core that runs after a fault as fallback is "fallback",

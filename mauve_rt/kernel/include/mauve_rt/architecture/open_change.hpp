@@ -65,6 +65,8 @@ class OpenChange {
   virtual void tell(std::vector<OpenChangeFacts>& /*all*/) const {}
   /// The component of that name if it is made, and that component has not taken it. [non-rt]
   virtual std::shared_ptr<Component> find_awaited(const std::string& /*component*/) const { return nullptr; }
+  /// Whether it also gives that component new parts. [non-rt]
+  virtual bool awaits_parts(const std::string& /*component*/) const { return false; }
   /// Whether a step of it names that component, or resource. [non-rt]
   virtual bool is_about(const std::string& /*target*/) const noexcept { return false; }
   /// Whether it is at a hook that has lasted for longer than who asked for it allows. [non-rt]
