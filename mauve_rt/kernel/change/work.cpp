@@ -269,6 +269,7 @@ void TransactionCommit::Work::gather() {
   prepare_publication();
   commit->set_publication(*this);
   if (is_structural_) commit->set_structural();
+  if (deployed_) commit->set_hosted();
   const LockGuard lock(facts_mutex_);
   commit_.swap(commit);
   touched_.swap(touched);

@@ -195,7 +195,7 @@ void Commit::publish() noexcept {
 Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
   const time_ns_t now_ns = monotonic_now_ns();
   timeout_ns_ = until_ns > now_ns ? until_ns - now_ns : 0;  // a timeout below 0 has passed long ago
-  if (!await_slots(until_ns)) return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
+  if (!await_slots(until_ns, gate)) return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
   // Before it waits for a lock: an urgent commit that needs the same calls it off there, too.
   if (!gate.begin(*this)) return Outcome::stale;
   const bool has_commands = lock(until_ns);
@@ -229,11 +229,13 @@ Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
   return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
 }
 
-/// Nothing is held while a component has yet to take an earlier change.
-bool Commit::await_slots(time_ns_t until_ns) noexcept {
+/// Nothing is held while a component has yet to take an earlier change. The gate does not know of this commit yet: a shutdown is
+/// looked for here.
+bool Commit::await_slots(time_ns_t until_ns, CommitGate& gate) noexcept {
   for (const Participant* participant : order_) {
     Task& task = *participant->task;
     while (!task.is_left_behind() && !task.wait_slot(std::min(until_ns, monotonic_now_ns() + kLook))) {
+      if (is_hosted_ && !gate.is_open()) call_off(Off::shut_down);
       if (!cut_.look().is_open()) return false;
       if (!task.is_simulated() && monotonic_now_ns() < until_ns) continue;
       occupied_ = &task;

@@ -465,6 +465,30 @@ TEST_F(Rule10Commit, ALateOneThatHangsCanBeRemovedByForce) {
   expect_going_on(*fast);
 }
 
+/// It waits for the adopt of an earlier change, which another component has refused, in a component that is stopped.
+TEST_F(Rule10Commit, AShutdownCallsOffAChangeThatWaitsForAnEarlierOne) {
+  deploy_two();
+  deployer.stop("slow");
+  auto hanging = std::make_unique<ToldCore>();
+  hanging->adopting = [this] { latch.wait(); };
+  auto refusing = std::make_unique<ToldCore>();
+  refusing->adopting = [this] { wait_until([&] { return latch.reached(); }, "the adopt of slow"); };
+  refusing->agrees = false;
+  Transaction both = replace("slow", std::move(hanging));
+  both.replace_core("fast", std::move(refusing));
+  const auto refused = error_of(std::move(both), {.timeouts = {.commit_ns = s_to_ns(2)}});
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(ErrorCode::adopt_refused, refused->code()) << refused->what();
+  request(replace("slow", std::make_unique<ToldCore>()), {.timeouts = {.commit_ns = s_to_ns(600)}});
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  EXPECT_FALSE(ended);
+  deployer.shutdown();
+  wait_ended();  // the minute of that is over long before the timeout
+  ASSERT_TRUE(error);
+  EXPECT_EQ(ErrorCode::not_configured, error->code()) << error->what();
+  EXPECT_THAT(error->what(), HasSubstr("was shut down before the change was made"));
+}
+
 TEST_F(Rule10Commit, WhatALateOnesChangeAddsIsNotAddedTwice) {
   deploy_two();
   Transaction first = replace("fast", core_that_waits());

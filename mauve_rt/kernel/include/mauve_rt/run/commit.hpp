@@ -181,6 +181,8 @@ class Commit {
   void set_yields() noexcept { yields_ = true; }
   /// [rt]
   bool yields() const MAUVE_RT { return yields_; }
+  /// It is for threads that run: it ends when they are shut down. [setup]
+  void set_hosted() noexcept { is_hosted_ = true; }
   /// What it makes of the table. [setup]
   void set_publication(Publication& publication) noexcept { publication_ = &publication; }
   /// Puts that into the table. [rt], by the gate, within a Look
@@ -256,7 +258,7 @@ class Commit {
 
  private:
   Participant* find(const Task& task) const MAUVE_RT;
-  bool await_slots(time_ns_t until_ns) noexcept;
+  bool await_slots(time_ns_t until_ns, CommitGate& gate) noexcept;
   bool lock(time_ns_t until_ns) noexcept MAUVE_LOCKS_UNSEEN;  // as many as take part
   void unlock() noexcept MAUVE_LOCKS_UNSEEN;
   bool has_commands() const MAUVE_RT;
@@ -283,6 +285,7 @@ class Commit {
   std::vector<Participant*> order_;  // by the tasks' numbers: who commands two tasks takes them in this order
   std::vector<CommitAction*> actions_;
   bool yields_{false};
+  bool is_hosted_{false};
   bool is_structural_{false};
   Atomic<bool> has_own_{false};
   time_ns_t timeout_ns_{0};

@@ -105,6 +105,11 @@ class CommitGate {
   /// [rt]
   void press(UrgentCommit& urgent) MAUVE_RT;
   void relax(UrgentCommit& urgent) MAUVE_RT;
+  /// Whether threads may take part in commits. [rt]
+  bool is_open() MAUVE_RT {
+    const Look look(*this);
+    return is_open_;
+  }
   /// Threads run, and take part in commits. [non-rt], hosts
   void open() noexcept;
   /// Calls off the commits under way, and each that comes before open(); waits for no commit. Commits of parked components
