@@ -475,9 +475,13 @@ void Component::stop_listening() noexcept {
   }
 }
 
+/// It may have been taken, and another core have replaced it since: then what it holds is no core to go back to.
+bool Component::is_fallback_in() const noexcept {
+  return fallback_ != nullptr && fallback_->was_taken() && task_.has_fallen_back();
+}
+
 Parts Component::another() const {
-  const bool has_fallen_back = fallback_ != nullptr && fallback_->was_taken();
-  const CoreBase& declared = has_fallen_back ? *fallback_->core() : *parts_.core;
+  const CoreBase& declared = is_fallback_in() ? *fallback_->core() : *parts_.core;
   return {.shell = shell().another(), .core = declared.another(), .fsm = fsm().another()};
 }
 
@@ -501,12 +505,15 @@ void Component::cleanup_hook() {
   spare_ = nullptr;
   if (fallback_ != nullptr) {
     // After a fault the declared core is the one that is out: it gets another chance.
+    const bool is_in = is_fallback_in();
+    const bool is_replaced = fallback_->was_taken() && !is_in;  // the renewal that is to come has it
     fallback_core_ = fallback_->give_back_core();
-    if (fallback_->was_taken()) std::swap(fallback_core_, parts_.core);
+    if (is_in) std::swap(fallback_core_, parts_.core);
     present_core_.store(parts_.core.get(), std::memory_order_release);
     core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
     fallback_.reset();
     fallback_core_->cleanup();
+    if (is_replaced) fallback_core_.reset();
   }
   binding_ = {};
   parts_.core->cleanup();

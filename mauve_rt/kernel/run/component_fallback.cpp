@@ -149,7 +149,11 @@ class Component::FallbackRenewal {
   }
   void begin() {
     Architecture* const architecture = component_.architecture_.load(std::memory_order_acquire);
-    if (architecture == nullptr || !component_.is_configured()) return;
+    if (architecture == nullptr) return;
+    if (!component_.is_configured()) {  // its configure makes it ready
+      if (spare_ != nullptr && component_.fallback_core_ == nullptr) component_.fallback_core_ = std::move(spare_);
+      return;
+    }
     if (!is_outdated_ && spare_ == nullptr && !component_.has_outdated_fallback()) return;
     component_.task_.retract_fallback();
     before_ = std::move(component_.fallback_);

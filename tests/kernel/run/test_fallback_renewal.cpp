@@ -114,6 +114,41 @@ TEST_F(FallbackRenewal, OtherChangesOfTheComponentGoOnAndTheFallbackFitsTheLastO
   expect_to_fall_back(guarded);
 }
 
+/// The renewal waits for a hook that uses the parts that were in. By then the fallback was in, and was replaced.
+class LateFallbackRenewal : public FallbackRenewal, public ::testing::WithParamInterface<bool> {};
+INSTANTIATE_TEST_SUITE_P(All, LateFallbackRenewal, ::testing::Bool(), [](const auto& tested) {
+  return std::string(tested.param ? "ComesBeforeTheConfigure" : "ComesAfterTheConfigure");
+});
+
+TEST_P(LateFallbackRenewal, ACleanupKeepsTheCoreThatReplacedTheFallback) {
+  auto guarded = add_guarded("c");
+  deploy();
+  wait_runs(guarded.component, 3);
+  expect_to_fall_back(guarded);
+  architecture.hold_parts(guarded.component);
+  Transaction change;
+  auto next = make_failing();
+  const TestCore* const third = next.get();
+  change.replace_core("c", std::move(next));
+  commit(change);
+  deployer.stop("c");
+  guarded.component.cleanup();
+  if (GetParam()) {
+    architecture.release_parts(guarded.component);
+    await_ready(guarded);
+  }
+  guarded.component.configure();
+  if (!GetParam()) {
+    architecture.release_parts(guarded.component);
+    await_ready(guarded);
+  }
+  EXPECT_EQ(third, &guarded.component.core()) << "and not the declared one, which was replaced";
+  deployer.start("c");
+  wait_runs(guarded.component, 3);
+  guarded.spare.runs = 0;
+  expect_to_fall_back(guarded);
+}
+
 TEST_F(FallbackRenewal, NoOtherComponentWaitsForIt) {
   auto hung = add_guarded("hung");
   auto guarded = add_guarded("c");

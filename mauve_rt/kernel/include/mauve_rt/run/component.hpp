@@ -399,6 +399,8 @@ class Component final : public Configurable {
   /// New instances of its parts, of the declared core where the fallback is in force; nullptr: another one cannot be made. [non-rt],
   /// by who has claimed it; parked
   Parts another() const;
+  /// Whether the core that runs is the fallback, and fallback_ holds the declared one. [non-rt], by who has claimed it; parked
+  bool is_fallback_in() const noexcept;
   /// Another instance of its fallback core; nullptr: none was declared, or it cannot be made. [non-rt], claimed
   std::unique_ptr<CoreBase> another_fallback() const;
 
