@@ -8,7 +8,7 @@ namespace mauve {
 
 void Configurable::configure() {
   if (configured_) return;
-  const RunningHook running("configure", description());
+  RunningHook running("configure", description());
   try {
     if (!configure_hook()) {
       throw Error(

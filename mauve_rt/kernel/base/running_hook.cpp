@@ -30,21 +30,26 @@ RunningHook::RunningHook(const char* name, const std::string& part)
   std::swap(outer_, all.hooks[std::this_thread::get_id()]);
 }
 
-RunningHook::~RunningHook() {
+RunningHook::~RunningHook() { end(); }
+
+/// Whether it was called off before. Looking and ending are one step: else it could be called off in between, and not learn of it.
+bool RunningHook::end() noexcept {
+  if (std::exchange(has_ended_, true)) return false;
   Running& all = running();
   const LockGuard lock(all.mutex);
+  const auto present = all.hooks.find(std::this_thread::get_id());
+  const bool is_off = present->second.is_off;
   if (outer_.hook.empty()) {
-    all.hooks.erase(std::this_thread::get_id());
+    all.hooks.erase(present);
   } else {
-    Facts& present = all.hooks[std::this_thread::get_id()];
-    outer_.is_off |= present.is_off;
-    present = std::move(outer_);
+    outer_.is_off |= is_off;
+    present->second = std::move(outer_);
   }
+  return is_off;
 }
 
-void RunningHook::leave() const {
-  if (!of(std::this_thread::get_id()).is_off) return;
-  throw Error(ErrorCode::wrong_revision, kCalledOff);
+void RunningHook::leave() {
+  if (end()) throw Error(ErrorCode::wrong_revision, kCalledOff);
 }
 
 bool RunningHook::call_off(std::thread::id thread, const std::function<bool()>& decide) {

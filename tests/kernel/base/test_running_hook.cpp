@@ -4,6 +4,7 @@
 #include <thread>
 
 #include "mauve_rt/base/configurable.hpp"
+#include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/running_hook.hpp"
 
 namespace mauve::testing::test_running_hook {
@@ -53,6 +54,30 @@ TEST(RunningHook, IsTheInnermostOfItsThread) {
   EXPECT_EQ("cleanup of outer", outer.cleaning);
   EXPECT_EQ("", own()) << "after one that throws";
   EXPECT_EQ(0, RunningHook::of(std::this_thread::get_id()).since_ns);
+}
+
+bool call_off_own() {
+  return RunningHook::call_off(std::this_thread::get_id(), [] { return true; });
+}
+
+TEST(RunningHook, IsCalledOffUntilItIsLeftAndNotAfter) {
+  RunningHook late("configure", "late");
+  EXPECT_NO_THROW(late.leave());
+  EXPECT_FALSE(call_off_own()) << "who has left it would not learn of it";
+  RunningHook early("configure", "early");
+  EXPECT_TRUE(call_off_own());
+  EXPECT_THROW(early.leave(), Error);
+}
+
+TEST(RunningHook, IsCalledOffWithTheHookThatItCalls) {
+  RunningHook outer("configure", "outer");
+  {
+    RunningHook inner("configure", "inner");
+    EXPECT_TRUE(call_off_own());
+    EXPECT_THROW(inner.leave(), Error);
+  }
+  EXPECT_THROW(outer.leave(), Error);
+  EXPECT_EQ("", own());
 }
 
 }  // namespace mauve::testing::test_running_hook

@@ -29,8 +29,8 @@ class RunningHook {
   RunningHook(const RunningHook&) = delete;
   RunningHook& operator=(const RunningHook&) = delete;
 
-  /// The hook has returned. Throws Error (wrong_revision) where it was called off.
-  void leave() const;
+  /// The hook has returned: from here on nobody calls it off. Throws Error (wrong_revision) where somebody has.
+  void leave();
 
   /// What that thread executes now.
   static Facts of(std::thread::id thread);
@@ -39,7 +39,10 @@ class RunningHook {
   static bool call_off(std::thread::id thread, const std::function<bool()>& decide);
 
  private:
+  bool end() noexcept;
+
   Facts outer_;
+  bool has_ended_{false};
 };
 
 }  // namespace mauve
