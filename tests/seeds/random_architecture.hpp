@@ -106,8 +106,12 @@ class RandomArchitecture : private Changes {
         return intervene("abandon " + name, kSlack, [&] { deployer_->abandon(name); });
       case 7: {
         const time_ns_t patience_ns = dice.between(0, ms_to_ns(60));
-        return intervene("revert " + name, patience_ns + s_to_ns(1) + kSlack,
-                         [&] { deployer_->revert_probation(name, "as the seed wants", patience_ns); });
+        const Intervention here(*this);
+        Scene::command(
+            "revert " + name, patience_ns + s_to_ns(1) + kSlack,
+            [&] { deployer_->revert_probation(name, "as the seed wants", patience_ns); }, nullptr,
+            kPrompt + kLook);
+        return;
       }
       case 8:
         Scene::command("settle", s_to_ns(1) + kSlack, [&] { deployer_->settle_probations(); });

@@ -48,9 +48,8 @@ void Task::step() {
   if ((control & kCommit) != 0 && !visit_posted()) return;
   if ((control & kEvent) != 0) settle_event();
   const time_ns_t now = clock().now_ns();
-  if (now < due_ns()) return;
   // Again, after the clock: this thread may have been kept from its processor, and an event that came before the timeout ends the wait.
-  settle_event();
+  if (now >= due_ns()) settle_event();
   if (now < due_ns()) return;
   // relaxed: what this thread has voted for it finds; for what it has not its later vote raises the cut
   if (slot_.load(std::memory_order_relaxed) != kEmpty) {

@@ -74,9 +74,11 @@ class Checks : protected Scene {
     sleep_for(kLongest + (seeds::outcome().stalled_ns > 0 ? ms_to_ns(60) : 0));
     for (std::size_t i = 0; i < parts_.size(); ++i) {
       const auto component = architecture_->find_component(parts_[i].name);
+      const bool has_hung = std::ranges::any_of(shared_->hung_cores, [&](const auto& each) {
+        return each.second.component == static_cast<int>(i) && each.second.until_ns > began_ns;
+      });
       if (component == nullptr || states[parts_[i].name] != ComponentState::running ||
-          component->task().state() != ComponentState::running ||
-          shared_->hanging_components.contains(static_cast<int>(i)))
+          component->task().state() != ComponentState::running || has_hung)
         continue;
       const bool has_run = std::ranges::any_of(shared_->executions, [&](const Execution& execution) {
         return execution.component == static_cast<int>(i) && execution.at_ns > began_ns;

@@ -55,6 +55,7 @@ class Scene {
   static constexpr time_ns_t kPrepare = ms_to_ns(30);
   static constexpr time_ns_t kCleanup = s_to_ns(1);  // a requester waits so long for the cleanup of old parts
   static constexpr time_ns_t kPatience = Commit::kPatience;  // with an adopt that hangs
+  static constexpr time_ns_t kLook = ms_to_ns(20);  // so often a requester looks whether a component has parked
   static constexpr time_ns_t kPrompt = ms_to_ns(15);  // of a request: where no core hangs, no timeout passes
 
   void expect(bool is_true, const std::string& otherwise) { findings_.expect(is_true, otherwise); }
@@ -106,7 +107,7 @@ class Scene {
   /// A command is carried out, or refused with a reason. Whether it was carried out.
   template <typename Request>
   bool command(const std::string& what, time_ns_t longest_ns, Request&& request,
-               const Intervention* alone = nullptr) {
+               const Intervention* alone = nullptr, time_ns_t prompt_ns = kPrompt) {
     bool is_done = false;
     const auto carry_out = [&] {
       try {
@@ -118,7 +119,7 @@ class Scene {
         expect(error.code() != ErrorCode::internal, what + ": internal error: " + error.what());
       }
     };
-    timed(what, longest_ns, kPrompt, carry_out, alone);
+    timed(what, longest_ns, prompt_ns, carry_out, alone);
     return is_done;
   }
 

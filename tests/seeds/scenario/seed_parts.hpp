@@ -43,6 +43,7 @@ struct Execution {
 
 /// A core that does not return from a hook or a state.
 struct Hang {
+  int component;
   time_ns_t clock_ns;  // of the release
   time_ns_t from_ns;
   bool is_in_state;
@@ -259,7 +260,8 @@ class SeedCore : public Core<TestShell> {
     if (!shared_->may_hang || shared_->hung_cores.contains(number_)) return;
     shared_->findings.count(manner_.name());
     Hang& here = shared_->hung_cores
-                     .emplace(number_, Hang{.clock_ns = clock_ns(),
+                     .emplace(number_, Hang{.component = component_,
+                                            .clock_ns = clock_ns(),
                                             .from_ns = seeds::now_ns(),
                                             .is_in_state = manner_.hook == Hook::state})
                      .first->second;
