@@ -220,11 +220,11 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
     std::exception_ptr failure{};
   };
   Preparation preparation_;
-  bool is_prepared_{false};    // for a prepared transaction, which lets go of it if it is not made
+  bool is_prepared_{false};  // for a prepared transaction, which lets go of it if it is not made
   /// Of touched_ the one of that name that has yet to take the change that is made; its size: there is none. [non-rt]
   std::size_t awaited_place(const std::string& component) const MAUVE_REQUIRES(facts_mutex_);
 
-  mutable Mutex facts_mutex_;  // for a moment: no hook, and no other lock
+  mutable Mutex facts_mutex_;                        // for a moment: no hook, and no other lock
   std::vector<std::shared_ptr<Component>> touched_;  // outlive the commit, which refers to their tasks
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component

@@ -151,7 +151,8 @@ class Component::FallbackRenewal {
     Architecture* const architecture = component_.architecture_.load(std::memory_order_acquire);
     if (architecture == nullptr) return;
     if (!component_.is_configured()) {  // its configure makes it ready
-      if (spare_ != nullptr && component_.fallback_core_ == nullptr) component_.fallback_core_ = std::move(spare_);
+      if (spare_ != nullptr && component_.fallback_core_ == nullptr)
+        component_.fallback_core_ = std::move(spare_);
       return;
     }
     if (!is_outdated_ && spare_ == nullptr && !component_.has_outdated_fallback()) return;

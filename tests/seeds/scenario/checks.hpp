@@ -107,8 +107,8 @@ class Checks : protected Scene {
                                             std::to_string(end_ns));
       }
       history_.note_verdict(core, record.verdict);
-      findings_.note(record.component + ": core " + std::to_string(core) + " " + to_string(record.verdict) + ": " +
-                     record.reason);
+      findings_.note(record.component + ": core " + std::to_string(core) + " " + to_string(record.verdict) +
+                     ": " + record.reason);
       findings_.count(std::string("probations ") + to_string(record.verdict));
     }
   }

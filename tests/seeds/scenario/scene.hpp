@@ -55,7 +55,8 @@ class Scene {
   static constexpr time_ns_t kPrepare = ms_to_ns(30);
   static constexpr time_ns_t kCleanup = s_to_ns(1);  // a requester waits so long for the cleanup of old parts
   static constexpr time_ns_t kPatience = Commit::kPatience;  // with an adopt that hangs
-  static constexpr time_ns_t kLook = ms_to_ns(20);  // so often a requester looks whether a component has parked
+  static constexpr time_ns_t kLook =
+      ms_to_ns(20);  // so often a requester looks whether a component has parked
   static constexpr time_ns_t kPrompt = ms_to_ns(15);  // of a request: where no core hangs, no timeout passes
 
   void expect(bool is_true, const std::string& otherwise) { findings_.expect(is_true, otherwise); }

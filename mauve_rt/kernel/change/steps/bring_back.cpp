@@ -20,8 +20,9 @@ std::unique_ptr<Part> another(const std::string& component, const Part& part) {
 void require_no_decided_change(Draft& draft, const std::shared_ptr<Component>& hung, Probation& probation) {
   if (draft.architecture().find_awaited(hung->name()) != hung) return;
   if (draft.architecture().awaits_parts(hung->name())) probation.conclude(ProbationCause::replaced);
-  throw Error(ErrorCode::wrong_revision, "the component has yet to take a change that is made",
-              {.component = hung->name(), .remedy = "remove the component and add it anew, in one transaction"});
+  throw Error(
+      ErrorCode::wrong_revision, "the component has yet to take a change that is made",
+      {.component = hung->name(), .remedy = "remove the component and add it anew, in one transaction"});
 }
 
 }  // namespace
