@@ -169,7 +169,7 @@ class RandomArchitecture : private Changes {
                        [&] {
                          deployer_->stop(name, options);
                          if (cleans_up && here.is_sole() && state_of(index) == ComponentState::stopped)
-                           configure_anew(index, true);
+                           configure_anew(index, &here);
                        },
                        &here);
     expect_just_faults();
@@ -182,7 +182,7 @@ class RandomArchitecture : private Changes {
   }
 
   /// Of a component that is stopped or FAULTED.
-  void configure_anew(std::size_t index, bool is_alone) {
+  void configure_anew(std::size_t index, const Intervention* alone) {
     const std::string& name = parts_[index].name;
     const auto component = architecture_->find_component(name);
     if (component == nullptr) return;
@@ -194,7 +194,8 @@ class RandomArchitecture : private Changes {
         component->configure();
         findings_.count(std::string("configured anew when ") + std::string(to_string(state)));
       } catch (const Error& error) {
-        expect(!is_alone || state != ComponentState::stopped || error.code() != ErrorCode::already_running,
+        expect(alone == nullptr || !alone->is_sole() || state != ComponentState::stopped ||
+                   error.code() != ErrorCode::already_running,
                name + " was stopped, and is refused: " + error.what());
         throw;
       }
@@ -208,7 +209,7 @@ class RandomArchitecture : private Changes {
     if (state != ComponentState::faulted && state != ComponentState::stopped) return;
     {
       const Intervention here(*this);
-      configure_anew(index, false);
+      configure_anew(index, nullptr);
     }
     start(index);
   }
