@@ -117,6 +117,10 @@ DraftComponent& Draft::touch(const std::string& name) {
     component->first_step = step_;
     by_name_.emplace(name, component);
   }
+  if (component->only_epoch) {
+    component->only_epoch = false;
+    component->first_step = step_;
+  }
   if (component->state == ComponentState::stopping) {
     component->component->task().throw_state_running("the component is STOPPING", 0,
                                                      "try again when it has stopped");
@@ -251,14 +255,15 @@ void Draft::resynchronise() {
   }
   resynchronise_step_ = step_;
   for (const auto& component : architecture_.components()) {
-    if (is_removed(component->name()) || is_unsettled(*component))
-      continue;  // one that is late keeps its grid
+    const bool is_late = is_unsettled(*component) && !component->task().is_left_behind();
+    if (is_removed(component->name()) || is_late) continue;  // one that is late keeps its grid
+    const bool is_new = find(component->name()) == nullptr;
     const ComponentState state = component->task().state();
-    if (state != ComponentState::faulted && state != ComponentState::unconfigured) {
-      touch(component->name());
-    } else if (find(component->name()) == nullptr) {
-      static_cast<void>(claim(component));  // no other change repairs and starts it on the old epoch
-    }
+    if (!is_new && (state == ComponentState::faulted || state == ComponentState::unconfigured)) continue;
+    // Also one that does not run takes part: no other change starts it on the old epoch, and it falls back on the new one.
+    DraftComponent& touched = touch(component->name());
+    touched.only_epoch =
+        is_new && (touched.state == ComponentState::faulted || touched.state == ComponentState::unconfigured);
   }
 }
 

@@ -202,7 +202,9 @@ void TransactionCommit::Work::settle_with_host() {
   if (!deployed_ || host_->is_deployed()) return;
   const time_ns_t until_ns = monotonic_now_ns() + Runner::kThreadEnd;  // of all, however many hang
   for (DraftComponent* added : prepared_added_) host_->detach(*added->component, until_ns);
-  for (const Change& change : changes_) host_->detach(*change.draft->component, until_ns);
+  for (const Change& change : changes_) {
+    if (!change.draft->only_epoch) host_->detach(*change.draft->component, until_ns);
+  }
 }
 
 void TransactionCommit::Work::draft_steps() {
@@ -256,10 +258,11 @@ void TransactionCommit::Work::gather() {
     place->replaces_parts = change.parts != nullptr;
     if (change.parts != nullptr && change.draft->restarts) change.parts->give_up_place();
     place->repairs = change.draft->is_repaired();
+    place->only_epoch = change.draft->only_epoch;
     if (draft_->resynchronise_step() != 0) place->epoch_lead_ns = kDeploymentLead;
     if (place->afterwards == Afterwards::restart) place->start_clock_ns = change.draft->clock_ns;
     if (change.retreat != nullptr) change.retreat->set_place(*place);
-    guard_.expect(*place, change.draft->state);
+    if (!place->only_epoch) guard_.expect(*place, change.draft->state);
     places_.insert_or_assign(change.draft->name(), &*place);
     ++place;
   }
@@ -392,8 +395,7 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
   throw Error(ErrorCode::adopt_refused, what);
 }
 
-/// Those that can take no part in a commit, faulted ones, have the new epoch too when they start again, also where a state of theirs
-/// still executes. One that is late keeps its grid.
+/// One that was late keeps its grid, unless it has faulted or parked since: then it has the new epoch when it starts again.
 void TransactionCommit::Work::set_epoch() {
   if (!resynchronises_) return;
   const time_ns_t epoch_ns = later_by(commit_->instant_ns() - 1, kDeploymentLead);
@@ -401,7 +403,7 @@ void TransactionCommit::Work::set_epoch() {
   for (const auto& component : architecture_.components()) {
     Task& task = component->task();
     const bool is_at_rest = task.is_parked() || task.state() == ComponentState::faulted;
-    if (is_at_rest && !places_.contains(component->name())) task.join(epoch_ns);
+    if (is_at_rest && !places_.contains(component->name())) task.join_newer(epoch_ns);
   }
 }
 

@@ -214,7 +214,8 @@ void TransactionCommit::Work::settle_place(Change& change) {
   Component& component = *draft.component;
   const bool has_taken = change.place->has_passed();  // else its thread hung, and has ended
   if (has_taken) note_handover(change);
-  if (has_taken && change.retreat == nullptr) {
+  // One that takes the epoch only may hang still: nothing else of it is looked at.
+  if (has_taken && change.retreat == nullptr && !draft.only_epoch) {
     component.show();
     for (ListenerChange* listener : change.listeners) listener->hand_over();
     if (component.is_configured()) component.update_listening();

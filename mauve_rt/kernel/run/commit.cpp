@@ -269,7 +269,8 @@ void Commit::unlock() noexcept {
 
 const Task* Commit::find_unfit() const noexcept {
   for (const Participant* participant : order_) {
-    if (participant->afterwards == Afterwards::stop || participant->repairs) continue;
+    const bool may_be_faulted = participant->repairs || participant->only_epoch;
+    if (participant->afterwards == Afterwards::stop || may_be_faulted) continue;
     const ComponentState state = participant->task->state();
     if (state == ComponentState::stopping || state == ComponentState::faulted) return participant->task;
   }
@@ -284,7 +285,8 @@ void Commit::begin() noexcept {
   for (Participant* participant : order_) {
     Task& task = *participant->task;
     participant->period_ns = task.grid().period_ns;
-    participant->left_behind = participant->afterwards == Afterwards::stop && task.claim();
+    const bool may_hang = participant->afterwards == Afterwards::stop || participant->only_epoch;
+    participant->left_behind = may_hang && task.claim();
     participant->in_flight = !participant->left_behind && !task.is_parked();
     // New parts may hang in adopt: that costs the component's own thread, where there is one.
     const bool has_own_thread = task.has_thread() && participant->replaces_parts;
@@ -388,7 +390,12 @@ void Commit::begin_completion() noexcept {
       participant->task->notify_commit();
     } else {
       participant->task->take_parked(*participant);
-      if (participant->left_behind) participant->task->abandon();
+      if (!participant->left_behind) continue;
+      if (participant->only_epoch) {
+        participant->task->give_up_claim();  // it comes back on the new epoch
+      } else {
+        participant->task->abandon();
+      }
     }
   }
   visit_simulated();

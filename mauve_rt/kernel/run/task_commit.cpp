@@ -243,7 +243,20 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
 
 /// Of a component that does not go on: it starts on the new epoch.
 void Task::join_new_epoch(const Participant& participant) noexcept {
-  if (const time_ns_t epoch_ns = participant.new_epoch_ns(); epoch_ns != 0) join(epoch_ns);
+  if (const time_ns_t epoch_ns = participant.new_epoch_ns(); epoch_ns != 0) join_newer(epoch_ns);
+}
+
+/// A take that hung may end after a later epoch was given. Who joins looks afterwards whether a later one has come, so that the last one
+/// to write the grid writes the latest epoch.
+void Task::join_newer(time_ns_t epoch_ns) noexcept {
+  time_ns_t latest = epoch_ns_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
+  // acq_rel: who finds the later epoch here writes the grid after who has written the earlier one
+  while (latest < epoch_ns && !epoch_ns_.compare_exchange_weak(latest, epoch_ns, std::memory_order_acq_rel)) {
+  }
+  latest = std::max(latest, epoch_ns);
+  do {
+    machine_.join(latest);
+  } while (!epoch_ns_.compare_exchange_strong(latest, latest, std::memory_order_acq_rel));
 }
 
 void Task::note_taken(const Commit& commit) noexcept {
@@ -273,6 +286,8 @@ void Task::go_on_with(Participant& participant, bool was_started) noexcept {
     return start_machine(start_on(participant.start_clock_ns));
   }
   if (epoch_ns != 0) {
+    epoch_ns_.store(epoch_ns,
+                    std::memory_order_relaxed);  // relaxed: of one that runs only this thread writes it
     participant.shift_ns = machine_.resynchronise(epoch_ns);
   }
   if (!restarts && (epoch_ns != 0 || place_kept_)) machine_.trace_deployment();
@@ -366,7 +381,8 @@ void Task::take_parked(Participant& participant) noexcept {
   Commit& commit = *participant.commit;
   participant.parked_ns = clock().now_ns();
   commit.take(participant);
-  note_taken(commit);
+  if (!participant.left_behind || !participant.only_epoch)
+    note_taken(commit);  // else its thread uses its machine still
   join_new_epoch(participant);
   // A shutdown may have come before the commit held the task.
   if (can_take_up_start() && participant.afterwards == Afterwards::restart) {

@@ -2,6 +2,7 @@
 // A new common epoch for an architecture that runs.
 #include "free_fsm.hpp"
 #include "hosts.hpp"
+#include "transaction_fixtures.hpp"
 
 namespace mauve::testing::test_resynchronise {
 
@@ -208,6 +209,66 @@ TEST_F(ResynchroniseHung, OneThatWasGivenUpTakesItToo) {
   EXPECT_EQ(architecture.deployment_epoch_ns(), hung.task().grid().reference_ns);
   *may_end = true;
   wait_until([&] { return hung.task().is_parked(); }, "the end of the state");
+}
+
+/// The take ends after the second epoch was given, and gives the first.
+TEST_F(ResynchroniseHung, OneWhoseTakeHangsKeepsTheLaterEpoch) {
+  struct CoreThatHangsInTake : TestCore {
+    explicit CoreThatHangsInTake(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
+    void take(CoreBase& /*old*/) noexcept override { doors->pass(); }
+    std::shared_ptr<Doors> doors;
+  };
+  const auto doors = std::make_shared<Doors>();
+  add("first");
+  Component& hung = add("hung");
+  deploy();
+  wait_runs(hung, 1);
+  Transaction both;
+  both.replace_core("hung", std::make_unique<CoreThatHangsInTake>(doors)).resynchronise();
+  deployer.commit(std::move(both), {.timeouts = {.commit_ns = ms_to_ns(10), .phase_ns = 0}});
+  wait_until([&] { return hung.task().state() == ComponentState::faulted; }, "the end of all patience");
+  const time_ns_t first_ns = architecture.deployment_epoch_ns();
+  deployer.commit(std::move(Transaction().resynchronise()), {.timeouts = {.phase_ns = 0}});
+  EXPECT_GT(architecture.deployment_epoch_ns(), first_ns);
+  doors->open = true;
+  wait_until([&] { return hung.task().is_parked(); }, "the end of the take");
+  EXPECT_EQ(architecture.deployment_epoch_ns(), hung.task().grid().reference_ns);
+}
+
+/// Its state ends while the change waits for another component: it comes back when the change is decided.
+TEST_F(ResynchroniseHung, OneThatFallsBackMeanwhileIsOnTheNewEpoch) {
+  struct SlowToAgree : TestCore {
+    explicit SlowToAgree(std::shared_ptr<Doors> shared) : doors(std::move(shared)) {}
+    bool adopt(const CoreBase& /*old*/) override {
+      doors->pass();
+      return true;
+    }
+    std::shared_ptr<Doors> doors;
+  };
+  const auto hangs = std::make_shared<Doors>();
+  const auto agrees = std::make_shared<Doors>();
+  add("other");
+  Component& hung = add("hung", 1, {.states = {{.name = "Run", .max_execution_ns = ms_to_ns(200)}}});
+  core(hung).work = [hangs, &own = core(hung)] {
+    if (own.runs == 2) hangs->pass();
+  };
+  hung.set_fallback(std::make_unique<TestCore>());
+  deploy();
+  wait_until([&] { return hung.task().state() == ComponentState::faulted; }, "the watchdog");
+  Transaction both;
+  both.replace_core("other", std::make_unique<SlowToAgree>(agrees)).resynchronise();
+  std::thread requester(
+      [&] { deployer.commit(std::move(both), {.timeouts = {.commit_ns = s_to_ns(20), .phase_ns = 0}}); });
+  wait_until([&] { return agrees->entered.load(); }, "the adopt");
+  hangs->open = true;
+  std::this_thread::sleep_for(std::chrono::milliseconds(30));
+  agrees->open = true;
+  requester.join();
+  wait_until([&] { return hung.task().state() == ComponentState::running; }, "the fallback");
+  EXPECT_TRUE(hung.task().has_fallen_back());
+  EXPECT_EQ(architecture.deployment_epoch_ns(), hung.task().grid().reference_ns);
+  wait_runs(hung, 2);
+  EXPECT_EQ(0, hung.task().grid().phase_error(hung.task().get_time()));
 }
 
 TEST(ResynchroniseUndeployed, IsRefused) {

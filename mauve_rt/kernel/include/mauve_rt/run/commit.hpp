@@ -75,10 +75,13 @@ struct Participant {
   bool replaces_parts{false};                 // its outputs are written as the ports' on_commit says
   time_ns_t epoch_lead_ns{0};  // its grid counts from a new epoch, T - 1 and this; 0: the epoch stays
   bool repairs{false};         // it was FAULTED, and the change repairs it
+  bool only_epoch{false};      // it was FAULTED or not configured, and takes the new epoch for its next start
   std::vector<CommitAction*> actions{};  // those of its own component, in the order of the change
   bool in_flight{false};                 // it was not parked when the change was posted
   bool is_own{false};  // its own thread votes and takes; else the requester does, the component being parked
-  bool left_behind{false};  // to be removed, while its thread still runs a timed-out execution
+  bool left_behind{
+      false};  // its thread still runs a timed-out execution, and does not come back before the decision: it is to be
+               // removed, or takes the new epoch only
   bool has_voted{false};
 
   Atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in

@@ -34,9 +34,9 @@ namespace mauve {
 /// | idle, entered    | timed out        | who stops by force                                                      |
 /// | timed out        | demoted          | the same, when FAULTED is told, the thread demoted, the outputs written |
 /// | demoted          | idle             | the thread: it came back                                                |
-/// | demoted          | claimed          | who is about to remove the component                                    |
-/// | claimed          | demoted          | the same, when the removal was refused                                  |
-/// | claimed          | abandoned        | the same, when it was made                                              |
+/// | demoted          | claimed          | who is about to remove the component, or to give it a new epoch         |
+/// | claimed          | demoted          | the same, when the removal was refused, or the epoch was given          |
+/// | claimed          | abandoned        | who removes it, when that is made                                       |
 ///
 /// | member    | order                                                                                               |
 /// | --------- | --------------------------------------------------------------------------------------------------- |
@@ -140,7 +140,7 @@ class ExecutionWord {
   /// The time-out is complete. [rt]
   void set_demoted() MAUVE_RT { exchange_phase(kTimedOut, kDemoted); }
 
-  // ---- who removes the component
+  // ---- who removes the component, or gives it a new epoch
 
   /// From now on the thread does not come back; false when it has, or did not time out. [rt]
   bool claim() MAUVE_RT {

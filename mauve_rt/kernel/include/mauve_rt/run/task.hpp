@@ -92,6 +92,7 @@ struct ChangeSignal {
 /// | demoted_, time_out_note_ | who times it out, machine           | machine      | execution_                         |
 /// | shell_                 | commanders, machine parked; its takes | machine, who times it out | release/acquire       |
 /// | core_                  | commanders, machine parked; its takes | machine      | parking                            |
+/// | epoch_ns_              | machine, or who gives it an epoch     | same             | acq_rel: join_newer()          |
 /// | taken_ns_              | machine, or who takes for it          | who times it out | relaxed: a lone number         |
 /// | fault_                 | machine; who timed it out                | anyone       | under fault_mutex_ (PI), a copy    |
 /// | watchdog_, locks_held_ | creator of the thread; the thread     | machine, who | has_thread_; execution_            |
@@ -202,7 +203,13 @@ class Task final : public Waiter {
   time_ns_t due_ns() const MAUVE_RT { return machine_.due_ns(); }
 
   /// Counts the grid from the deployment's epoch: start() falls back on it; returns its first instant. [setup]
-  time_ns_t join(time_ns_t epoch_ns) noexcept { return machine_.join(epoch_ns); }
+  time_ns_t join(time_ns_t epoch_ns) noexcept {
+    epoch_ns_.store(epoch_ns, std::memory_order_relaxed);  // relaxed: no commit is under way
+    return machine_.join(epoch_ns);
+  }
+  /// The same for the epoch that a commit gives to one that does not run, unless another commit has given it a later one. Several threads
+  /// may, at the same time: that of the component, and requesters. [rt]
+  void join_newer(time_ns_t epoch_ns) MAUVE_RT;
   /// The grid now; another commit may change it any moment. [rt]
   Grid grid() const MAUVE_RT { return machine_.grid(); }
 
@@ -295,7 +302,7 @@ class Task final : public Waiter {
   bool write_outputs_left() noexcept;
 
   /// The thread of an execution that timed out is not to come back from now on; false when it has. [rt], who removes the
-  /// component.
+  /// component, or gives it a new epoch.
   bool claim() MAUVE_RT { return machine_.execution().claim(); }
   /// It may again; or never, and what its outputs lack is not written any more. [rt], the same.
   void give_up_claim() MAUVE_RT { machine_.execution().give_up_claim(); }
@@ -477,6 +484,7 @@ class Task final : public Waiter {
   Atomic<Participant*> participant_{nullptr};
   Atomic<bool> removed_{false};
   Atomic<time_ns_t> taken_ns_{0};  // T of the last change that it has taken
+  Atomic<time_ns_t> epoch_ns_{0};  // the latest that it was given
   time_ns_t start_at_ns_{0};
   static constexpr std::uint32_t kAllWritten = 0, kLeft = 1, kWriting = 2;
   Atomic<std::uint32_t> outputs_{kAllWritten};
