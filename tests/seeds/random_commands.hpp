@@ -213,6 +213,7 @@ class RandomCommands {
     attempt("repair " + name(component), ms_to_ns(20), [&] {
       Transaction transaction;
       transaction.replace_core(name(component), core(component));
+      shared_->followed_by_older.insert(last_core_);  // by that of a change that waits meanwhile
       deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(20), .phase_ns = 0}});
     });
   }
@@ -225,7 +226,7 @@ class RandomCommands {
       if (dice.once_in(2)) {
         std::unique_ptr<CoreBase> fresh = core(i);
         if (!is_plain_ && dice.once_in(3)) {
-          shared_->trials.insert(last_core_);
+          shared_->followed_by_older.insert(last_core_);
           const time_ns_t duration_ns = dice.between(us_to_ns(500), ms_to_ns(20));
           transaction.replace_core(name(i), std::move(fresh),
                                    ProbationOptions{.duration_ns = duration_ns, .on_overrun = false});

@@ -42,9 +42,9 @@ struct CommandShared {
   std::array<Known, 2> components{};
   std::vector<Epoch> epochs{};
   bool is_plain{false};
-  bool has_hangs{false};   // states that take up to kHang: then nothing is expected to come promptly
-  std::set<int> trials{};  // cores that are, or were, on probation
-  int cores{0};            // that are configured
+  bool has_hangs{false};  // states that take up to kHang: then nothing is expected to come promptly
+  std::set<int> followed_by_older{};  // cores that are, or were, on probation, and those of repairs
+  int cores{0};                       // that are configured
 };
 
 class CommandCore : public Core<TestShell> {
@@ -57,7 +57,7 @@ class CommandCore : public Core<TestShell> {
     CommandShared::Known& known = shared_->components[component_];
     expect(is_ready_, "executes and is not configured");
     expect(!known.is_stopped, "executes after a stop");
-    expect(number_ >= known.core || shared_->trials.contains(known.core),
+    expect(number_ >= known.core || shared_->followed_by_older.contains(known.core),
            "executes after core " + std::to_string(known.core));
     known.core = number_;
     ++known.executions;
