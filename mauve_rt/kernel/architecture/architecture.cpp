@@ -8,6 +8,7 @@
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/change/transaction_commit.hpp"
 
 #include "base/keep_for_ever.hpp"
@@ -164,15 +165,26 @@ void Architecture::settle_changes() noexcept {
   }
 }
 
+/// A change that comes first makes this one stale, which has the core by then: it is given back, and the next change takes it.
 void Architecture::bring_back(Component& hung) {
   constexpr time_ns_t kEarlierChanges = s_to_ns(5);
+  constexpr time_ns_t kBetweenTries = ms_to_ns(1);
   const auto probation = hung.present_probation();
-  Transaction change;
-  change.bring_back(hung.name()).by("probation");
-  try {
-    make(std::move(change), {.timeouts = {.commit_ns = kEarlierChanges}});
-  } catch (const Error& failure) {
-    if (probation != nullptr) probation->note_left_out(failure.what());
+  const time_ns_t until = later_by(monotonic_now_ns(), kEarlierChanges);
+  for (;; sleep_for(kBetweenTries)) {
+    Transaction change;
+    change.bring_back(hung.name()).by("probation");
+    try {
+      make(std::move(change), {.timeouts = {.commit_ns = kEarlierChanges}});
+      if (probation != nullptr) probation->end_comeback();
+      return;
+    } catch (const Error& failure) {
+      if (probation == nullptr) return;
+      const bool may_pass =
+          failure.code() == ErrorCode::wrong_revision || failure.code() == ErrorCode::timeout;
+      if (may_pass && probation->has_core_back() && monotonic_now_ns() < until) continue;
+      return probation->note_left_out(failure.what());
+    }
   }
 }
 

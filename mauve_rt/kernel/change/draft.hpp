@@ -48,6 +48,8 @@ struct DraftComponent {
   int configure_step{0};     // the last that configures it anew
   bool is_made_anew{false};  // by new instances of its parts
   int first_step{0};
+  std::shared_ptr<Probation>
+      comeback_of{};  // its core is taken over from that one, which has it back when the change is not made
   bool only_epoch{
       false};  // FAULTED or not configured: it takes a new epoch for its next start, and nothing else
   std::vector<std::unique_ptr<CommitAction>>

@@ -400,6 +400,18 @@ void TransactionCommit::Work::let_go(const std::shared_ptr<Component>& component
   }
 }
 
+/// Before the components of these are cleaned up: the cores stay configured.
+void TransactionCommit::Work::give_back_comebacks() noexcept {
+  if (draft_ == nullptr) return;
+  for (DraftComponent& added : draft_->components()) {
+    if (added.comeback_of == nullptr) continue;
+    const bool is_prepared = added.fresh.core == nullptr;
+    std::unique_ptr<CoreBase> core =
+        is_prepared ? added.component->release_core() : std::move(added.fresh.core);
+    added.comeback_of->give_back(core);
+  }
+}
+
 /// Of one that is not made.
 void TransactionCommit::Work::discard() noexcept {
   MAUVE_AUDIT(architecture_.change_lock().is_held_here());
@@ -422,6 +434,7 @@ void TransactionCommit::Work::discard_rest() noexcept {
   settle_with_host();
   for (Change& change : changes_) dispose(change);
   for (ConfiguredAnew& done : configured_anew_) restore_state(*done.component, done.before, done.fault);
+  give_back_comebacks();
   for (DraftComponent* added : prepared_added_) let_go(added->component, false);
   for (const auto& resource : prepared_resources_)
     architecture_.dispose("cleanup of " + resource->description(), [resource] { resource->cleanup(); });

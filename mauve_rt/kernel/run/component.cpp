@@ -496,7 +496,14 @@ void Component::check_cleanup() const {
   check_renewed();
 }
 
+std::unique_ptr<CoreBase> Component::release_core() noexcept {
+  binding_ = {};
+  return std::move(parts_.core);
+}
+
 void Component::cleanup_hook() {
+  // The old core of one that hung in a probation, where it could not go on in another component.
+  if (const auto probation = present_probation()) probation->put_back_taken();
   conclude_probation();
   settle_probation(true);
   conclude_shadow();
@@ -516,7 +523,7 @@ void Component::cleanup_hook() {
     if (is_replaced) fallback_core_.reset();
   }
   binding_ = {};
-  parts_.core->cleanup();
+  if (parts_.core != nullptr) parts_.core->cleanup();  // else release_core()
   parts_.fsm->cleanup();
   parts_.shell->cleanup();
   task_.set_state(ComponentState::unconfigured);

@@ -242,9 +242,11 @@ bool Probation::begin_end() noexcept {
 }
 
 void Probation::end(Phase phase, ProbationCause why) noexcept {
-  cause_ = why;
-  ended_ns_ = component_.task().clock().now_ns();
-  MAUVE_EXPECTS(this->phase() == kEnding && phase > kEnding);
+  MAUVE_EXPECTS(this->phase() == kEnding && phase >= kConcluded);
+  if (cause_ != ProbationCause::hung) {  // else it was decided when the core was taken over
+    cause_ = why;
+    ended_ns_ = component_.task().clock().now_ns();
+  }
   phase_.store(phase, std::memory_order_release);  // release: the cause, and parts that were put back
   futex_wake_all(phase_);
 }
@@ -257,7 +259,9 @@ bool Probation::put_back() noexcept {
 }
 
 void Probation::conclude(ProbationCause why) noexcept {
-  if (begin_end()) end(kConcluded, why);
+  if (begin_end()) return end(kConcluded, why);
+  // Of one that was taken over, other parts replace the core that hung; the end of its host leaves the old core to the next cleanup.
+  if (why == ProbationCause::replaced || why == ProbationCause::fell_back) end_comeback();
 }
 
 // ---- ordinary threads
@@ -303,17 +307,57 @@ bool Probation::conclude_if_over() noexcept {
 }
 
 std::unique_ptr<CoreBase> Probation::take_over() noexcept {
-  if (!begin_end()) return nullptr;
+  if (!begin_end()) {
+    const LockGuard lock(request_mutex_);
+    return std::move(core_back_);
+  }
   auto core = parts_->give_back_core();
   hung_for_ns_ = component_.task().state_age().age_ns;
-  end(kReverted, ProbationCause::hung);
+  cause_ = ProbationCause::hung;
+  ended_ns_ = component_.task().clock().now_ns();
+  phase_.store(kTakenOver, std::memory_order_release);  // release: the facts before
   return core;
+}
+
+void Probation::give_back(std::unique_ptr<CoreBase>& core) noexcept {
+  if (core == nullptr) return;
+  const LockGuard lock(request_mutex_);
+  if (phase() != kTakenOver) return;
+  core->bind_shell(component_.shell());  // that of the component that has not come goes
+  core->set_context(&component_.task().context());
+  core_back_ = std::move(core);
+}
+
+bool Probation::has_core_back() const {
+  const LockGuard lock(request_mutex_);
+  return core_back_ != nullptr;
+}
+
+/// From then on only the caller ends it.
+bool Probation::end_taken_over() noexcept {
+  std::uint32_t taken_over = kTakenOver;
+  return phase_.compare_exchange_strong(taken_over, kEnding, std::memory_order_acq_rel);
+}
+
+void Probation::end_comeback() noexcept {
+  if (end_taken_over()) end(kReverted, ProbationCause::hung);
+}
+
+bool Probation::put_back_taken() noexcept {
+  if (!has_core_back() || !end_taken_over()) return false;
+  {
+    const LockGuard lock(request_mutex_);
+    parts_->take_core_back(std::move(core_back_));
+  }
+  parts_->put_back();
+  end(kReverted, ProbationCause::hung);
+  return true;
 }
 
 /// While one that hangs is on probation, only a shutdown ends it besides.
 bool Probation::is_taken_over() const noexcept {
   const Phase now = phase();
-  return now == kEnding || (now == kReverted && cause_ == ProbationCause::hung);
+  return now == kEnding || now == kTakenOver || (now == kReverted && cause_ == ProbationCause::hung);
 }
 
 bool Probation::claim_comeback() noexcept {
@@ -333,7 +377,12 @@ const FsmBase& Probation::old_fsm() const noexcept {
 
 void Probation::keep(std::unique_ptr<PartsChange> parts) noexcept { kept_ = std::move(parts); }
 
-std::unique_ptr<PartsChange> Probation::release_parts() noexcept { return std::move(kept_); }
+std::unique_ptr<PartsChange> Probation::release_parts() noexcept {
+  const LockGuard lock(request_mutex_);
+  if (core_back_ != nullptr && kept_ != nullptr)
+    kept_->take_core_back(std::move(core_back_));  // it is cleaned up with them
+  return std::move(kept_);
+}
 
 ProbationRecord Probation::record() const {
   const Phase now = phase();
@@ -350,13 +399,13 @@ ProbationRecord Probation::record() const {
     record.reason = component_.task().fault().what + "; the old core " +
                     (left_out_.empty() ? "goes in when it ends" : "does not go on: " + left_out_);
   }
-  if (now < kConcluded) return record;
+  if (now < kTakenOver) return record;
   record.cause = cause_;
   record.end_ns = ended_ns_;
   record.reason = reason();
-  record.verdict = now == kReverted                 ? ProbationVerdict::reverted
-                   : cause_ == ProbationCause::none ? ProbationVerdict::passed
-                                                    : ProbationVerdict::inconclusive;
+  record.verdict = now == kReverted || now == kTakenOver ? ProbationVerdict::reverted
+                   : cause_ == ProbationCause::none      ? ProbationVerdict::passed
+                                                         : ProbationVerdict::inconclusive;
   return record;
 }
 

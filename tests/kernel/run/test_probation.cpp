@@ -756,6 +756,68 @@ TEST_F(ProbationHangs, TheOldCoreGoesOnByAnotherThread) {
   EXPECT_EQ(0, (old->instants.back() - (*host).epoch_ns()) % kPeriod) << "on the grid of the deployment";
 }
 
+/// What the shells of comebacks do when they are configured.
+struct ShellOfComebacks : TestShell {
+  explicit ShellOfComebacks(std::function<bool()> at_configure) : configures(std::move(at_configure)) {}
+  bool configure_hook() override { return configures(); }
+  std::function<bool()> configures;
+};
+
+/// The change that was to bring the core back has it by then, and gives it to the next one.
+TEST_F(ProbationHangs, AComebackThatGoesStaleIsMadeAgain) {
+  Component& trial = add_trial("c", kSettings);
+  const auto configures = std::make_shared<Doors>();
+  trial.shell().set_factory([configures] {
+    return std::make_unique<ShellOfComebacks>([configures] {
+      configures->pass();
+      return true;
+    });
+  });
+  const auto hung = put_in_one_that_hangs({.duration_ns = s_to_ns(20)});
+  Transaction addition;
+  addition.add_component<TestShell, TestCore, TestFsm>("later");
+  const auto first = (*host).prepare(std::move(addition));
+  wait_until(
+      [&] {
+        settle();
+        return configures->entered.load();
+      },
+      "the comeback");
+  EXPECT_EQ(PreparedOutcome::committed, first->commit(kLong));
+  configures->open = true;
+  const auto component = await_successor(hung);
+  wait_state(*component, ComponentState::running);
+  expect_old_core_runs_on(*component);
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  EXPECT_THAT(record().reason, HasSubstr("the old core goes on by another thread"));
+  doors->open = true;
+  wait_until([&] { return hung->task().has_ended(); }, "the end of the thread that hung");
+}
+
+TEST_F(ProbationHangs, TheOldCoreThatCouldNotComeBackIsInAfterACleanup) {
+  Component& trial = add_trial("c", kSettings);
+  trial.shell().set_factory([] { return std::make_unique<ShellOfComebacks>([] { return false; }); });
+  const auto hung = put_in_one_that_hangs({.duration_ns = s_to_ns(20)});
+  wait_until(
+      [&] {
+        settle();
+        return record().reason.find("does not go on") != std::string::npos;
+      },
+      "the comeback");
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  doors->open = true;
+  wait_until([&] { return hung->task().is_parked(); }, "the end of the state");
+  EXPECT_EQ(ComponentState::faulted, hung->task().state());
+  const int runs = seen->runs;
+  hung->configure_anew();
+  (*host).start("c");
+  wait_seen(*old_seen, old_seen->runs + 3);
+  EXPECT_EQ("t/Old", hung->core_implementation());
+  EXPECT_EQ(runs, seen->runs) << "it was reverted";
+  EXPECT_EQ(Verdict::reverted, record().verdict);
+  wait_cleaned(*seen);
+}
+
 TEST_F(ProbationHangs, ItIsOnProbationAgainAndStopped) {
   add_trial("c", kSettings);
   const auto component = await_successor(put_in_one_that_hangs());

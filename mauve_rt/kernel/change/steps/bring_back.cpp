@@ -34,7 +34,9 @@ constexpr StepKind steps::bring_back{
     .draft = [](Draft& draft, TransactionStep& step) {
       const auto hung = draft.architecture().hold_component(step.target);
       const auto probation = hung->present_probation();
-      if (probation == nullptr || !hung->task().is_given_up_on_probation()) {
+      const bool hangs = hung->task().is_given_up_on_probation();
+      // With the core back the state may have ended: the component is FAULTED then, with the core that hung.
+      if (probation == nullptr || (!hangs && !probation->has_core_back())) {
         throw Error(ErrorCode::wrong_revision, "no core of the component hangs on probation",
                     {.component = step.target});
       }
@@ -57,6 +59,7 @@ constexpr StepKind steps::bring_back{
         throw Error(ErrorCode::wrong_revision, "the state has ended meanwhile, and the old core is back",
                     {.component = step.target});
       }
+      added.comeback_of = probation;
       component.begin_with(probation->record());
     }};
 

@@ -79,9 +79,9 @@ struct Participant {
   std::vector<CommitAction*> actions{};  // those of its own component, in the order of the change
   bool in_flight{false};                 // it was not parked when the change was posted
   bool is_own{false};  // its own thread votes and takes; else the requester does, the component being parked
-  bool left_behind{
-      false};  // its thread still runs a timed-out execution, and does not come back before the decision: it is to be
-               // removed, or takes the new epoch only
+  /// Its thread still runs a timed-out execution, and does not come back before the decision: it is to be removed, or takes the new epoch
+  /// only.
+  bool left_behind{false};
   bool has_voted{false};
 
   Atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in

@@ -121,6 +121,8 @@ class PartsChange final : public CommitAction {
   const FsmBase* fsm_out() const noexcept { return parts_.fsm.get(); }
   /// Gives away the core that is not in force now. [non-rt]
   std::unique_ptr<CoreBase> give_back_core() noexcept { return std::move(parts_.core); }
+  /// Has it again. [non-rt]
+  void take_core_back(std::unique_ptr<CoreBase> core) noexcept { parts_.core = std::move(core); }
   bool was_taken() const noexcept { return taken_; }
 
   bool adopt() override;
@@ -360,6 +362,8 @@ class Component final : public Configurable {
     const LockGuard lock(shown_mutex_);
     last_probation_ = std::move(last);
   }
+  /// Gives away the core of one that was added by a change that is not made: nothing but its end follows. [non-rt]
+  std::unique_ptr<CoreBase> release_core() noexcept;
   /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
   void conclude_probation() noexcept;
 

@@ -139,7 +139,7 @@ struct ProbationRecord {
 /// | found_ ...        | the component's thread, or who is parked for it | anyone, once ended | phase_                          |
 /// | releases_         | the component's thread                    | anyone              | relaxed: a lone number               |
 /// | is_requested_     | requesters                                | component's thread  | release/acquire                      |
-/// | request_, left_out_ | requesters; who brings the old core back | anyone             | request_mutex_                       |
+/// | request_, left_out_, core_back_ | requesters; who brings the old core back | anyone | request_mutex_                       |
 /// | is_comeback_claimed_ | who settles                            | who settles         | relaxed: a lone flag                 |
 /// | the rest          | [setup]                                   | anyone              | -                                    |
 class Probation : public std::enable_shared_from_this<Probation> {
@@ -182,9 +182,18 @@ class Probation : public std::enable_shared_from_this<Probation> {
   bool is_reverted() const MAUVE_RT { return phase() == kReverted; }
   /// Ends it when its time is over. Whether it has ended. [non-rt]
   bool conclude_if_over() noexcept;
-  /// Where a state of the new core does not end: takes the old core out, and ends it as reverted; the thread that hangs puts nothing
-  /// back any more. nullptr: it has done so before, or the probation has ended. [non-rt]
+  /// Where a state of the new core does not end: takes the old core out; the verdict is reverted from then on, and the thread that hangs
+  /// puts nothing back any more. The core that give_back() has brought, too. nullptr: it is out, or the probation has ended. [non-rt]
   std::unique_ptr<CoreBase> take_over() noexcept;
+  /// The change that was to bring the core back was not made: keeps the core for the next one, or for who cleans up the component. Leaves it
+  /// to the caller where the probation has ended. [non-rt]
+  void give_back(std::unique_ptr<CoreBase>& core) noexcept;
+  /// Whether it has the core that was given back. [non-rt]
+  bool has_core_back() const;
+  /// The core that was taken over goes on in another component. [rt]
+  void end_comeback() MAUVE_RT;
+  /// Puts the core that was given back into its parked component; false when there is none. [non-rt], by who has claimed the component.
+  bool put_back_taken() noexcept;
   /// Whether that is done, or about to be. [rt]
   bool is_taken_over() const MAUVE_RT;
   /// The first caller is to bring the old core back of one that hangs. [non-rt]
@@ -200,7 +209,7 @@ class Probation : public std::enable_shared_from_this<Probation> {
   ProbationRecord record() const;
 
  private:
-  enum Phase : std::uint32_t { kPrepared, kRunning, kEnding, kConcluded, kReverted };
+  enum Phase : std::uint32_t { kPrepared, kRunning, kEnding, kTakenOver, kConcluded, kReverted };
   struct Limit {
     std::string path;
     NumberPlace place;
@@ -224,6 +233,7 @@ class Probation : public std::enable_shared_from_this<Probation> {
   bool is_watched() const MAUVE_RT;
   void find(const Found& found) MAUVE_RT;
   bool begin_end() MAUVE_RT;
+  bool end_taken_over() MAUVE_RT;
   void end(Phase phase, ProbationCause why) MAUVE_RT;
   void add(const OutputLimit& limit);
   PortLimits& limits_of(PortBase& port);
@@ -253,7 +263,8 @@ class Probation : public std::enable_shared_from_this<Probation> {
   Atomic<bool> is_comeback_claimed_{false};
   mutable Mutex request_mutex_;
   std::string request_ MAUVE_GUARDED_BY(request_mutex_){};
-  std::string left_out_ MAUVE_GUARDED_BY(request_mutex_){};  // why the old core does not go on
+  std::string left_out_ MAUVE_GUARDED_BY(request_mutex_){};                 // why the old core does not go on
+  std::unique_ptr<CoreBase> core_back_ MAUVE_GUARDED_BY(request_mutex_){};  // taken over, and given back
   time_ns_t hung_for_ns_{0};
 };
 
