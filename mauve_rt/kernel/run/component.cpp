@@ -517,7 +517,8 @@ void Component::cleanup_hook() {
     fallback_core_ = fallback_->give_back_core();
     if (is_in) std::swap(fallback_core_, parts_.core);
     present_core_.store(parts_.core.get(), std::memory_order_release);
-    core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
+    if (parts_.core != nullptr)  // else release_core()
+      core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
     fallback_.reset();
     fallback_core_->cleanup();
     if (is_replaced) fallback_core_.reset();

@@ -766,6 +766,9 @@ struct ShellOfComebacks : TestShell {
 /// The change that was to bring the core back has it by then, and gives it to the next one.
 TEST_F(ProbationHangs, AComebackThatGoesStaleIsMadeAgain) {
   Component& trial = add_trial("c", kSettings);
+  auto spare = std::make_unique<TestCore>();
+  spare->set_factory([] { return std::make_unique<TestCore>(); });
+  trial.set_fallback(std::move(spare));
   const auto configures = std::make_shared<Doors>();
   trial.shell().set_factory([configures] {
     return std::make_unique<ShellOfComebacks>([configures] {

@@ -47,6 +47,7 @@ struct Hang {
   time_ns_t clock_ns;  // of the release
   time_ns_t from_ns;
   bool is_in_state;
+  bool is_in_cleanup;
   time_ns_t until_ns{kForever};
 };
 
@@ -263,7 +264,8 @@ class SeedCore : public Core<TestShell> {
                      .emplace(number_, Hang{.component = component_,
                                             .clock_ns = clock_ns(),
                                             .from_ns = seeds::now_ns(),
-                                            .is_in_state = manner_.hook == Hook::state})
+                                            .is_in_state = manner_.hook == Hook::state,
+                                            .is_in_cleanup = manner_.hook == Hook::cleanup})
                      .first->second;
     const auto hanging = shared_->hanging_components.insert(component_);
     shared_->hung_components.insert(component_);
