@@ -176,18 +176,24 @@ class History {
     const auto writes = shared.writes.find(static_cast<int>(execution.input - written_by(0)));
     if (execution.input < written_by(0) || writes == shared.writes.end()) return;
     for (const time_ns_t at_ns : writes->second) {
-      if (is_missed_in_visit(execution, shared, at_ns)) continue;
+      if (is_missed_in_visit(execution, shared, writes->second, at_ns)) continue;
       findings_.expect(at_ns <= last.at_ns + kUnclear || at_ns >= execution.clock_ns - kUnclear,
                        where(execution) + " was released by its timeout; the event at " +
                            std::to_string(at_ns) + " was lost");
     }
   }
 
-  /// An adopt or take that lasted beyond the timeout that counts from the event: the wait ends with it.
-  static bool is_missed_in_visit(const Execution& execution, const Shared& shared, time_ns_t event_ns) {
+  /// An adopt or take that lasted beyond the timeout that counts from its first event: the wait ends with it, and later events are one
+  /// with the first.
+  template <typename Times>
+  static bool is_missed_in_visit(const Execution& execution, const Shared& shared, const Times& events,
+                                 time_ns_t event_ns) {
     return std::ranges::any_of(shared.visits, [&](const Visit& visit) {
       return visit.component == execution.component && visit.from_ns <= event_ns &&
-             visit.to_ns >= event_ns + EventFsm::kTimeout - kUnclear && visit.to_ns <= execution.clock_ns;
+             visit.to_ns <= execution.clock_ns && std::ranges::any_of(events, [&](time_ns_t first_ns) {
+               return first_ns >= visit.from_ns && first_ns <= event_ns &&
+                      visit.to_ns >= first_ns + EventFsm::kTimeout - kUnclear;
+             });
     });
   }
 
