@@ -181,10 +181,23 @@ Refused for a latest_value that has one.)")
 element: core, fsm, shell, state, "property NAME", "port NAME"; empty: the target itself.)")
       .def(
           "note_author",
-          [](PyArchitecture& self, const std::string& target, const std::string& element,
-             const std::string& author) { self.architecture.note_author(target, element, author); },
-          py::arg("target"), py::arg("element"), py::arg("author"),
-          "Of a change that was made without a transaction.")
+          [](PyArchitecture& self, const Assignment& step, const std::string& author) {
+            self.architecture.note_author({{.target = step.target, .name = "state"}, step}, author);
+          },
+          py::arg("step"), py::arg("author"), "Of a start or stop that was made without a transaction.")
+      .def_property_readonly(
+          "overlays", [](PyArchitecture& self) -> Overlays& { return self.architecture.overlays(); },
+          py::return_value_policy::reference_internal)
+      .def(
+          "follow",
+          [](PyArchitecture& self) {
+            const Overlays::Look look = self.architecture.overlays().look();
+            self.architecture.follow(look, self.architecture.describe());
+          },
+          Unlocked(), "Let the overlays know what has become of the architecture.")
+      .def(
+          "note_overlays", [](PyArchitecture& self) { self.architecture.changes().bump(); },
+          "Somebody changed what is wanted.")
       .def(
           "revision", [](PyArchitecture& self) { return self.architecture.revision(); },
           "Grows with every committed change and every start, stop and fault; never 0.")

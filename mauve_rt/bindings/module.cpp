@@ -26,6 +26,7 @@ Attributes:
   bind_shadow(module);
   bind_open_change(module);
   bind_transaction(module);
+  bind_overlays(module);
   bind_architecture(module);
   bind_value_log(module);
   bind_host(module);

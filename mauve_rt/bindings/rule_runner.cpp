@@ -16,9 +16,10 @@ using Unlocked = py::call_guard<InterpreterUnlocked>;
 /// Its threads end without the interpreter's lock, and before the interpreter does: they may need it for parts in Python.
 class PyRuleRunner {
  public:
-  PyRuleRunner(PyHost& host, std::vector<rules::Rule> all, const std::vector<rules::RuleActions>& actions,
+  PyRuleRunner(PyHost& host, std::vector<rules::Rule> all, std::vector<rules::RuleActions> actions,
                std::map<std::string, std::string> topics, PyRuleRunner* before)
-      : runner_(std::make_unique<rules::RuleRunner>(host.host(), std::move(all), actions, std::move(topics),
+      : runner_(std::make_unique<rules::RuleRunner>(host.host(), std::move(all), std::move(actions),
+                                                    std::move(topics),
                                                     before != nullptr ? before->runner_.get() : nullptr)) {
     living().insert(this);
   }
@@ -48,8 +49,8 @@ class PyRuleRunner {
   std::unique_ptr<rules::RuleRunner> runner_;
 };
 
-rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps undo,
-                                const std::string& reserve) {
+rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps undo, const std::string& reserve,
+                                bool takes_over, bool whole) {
   if (reserve != "stop" && reserve != "safe_outputs") {
     throw Error(ErrorCode::invalid_argument, "there is no such reserve action",
                 {.expected = "stop or safe_outputs", .found = reserve});
@@ -58,29 +59,28 @@ rules::RuleActions rule_actions(rules::ActionSteps steps, rules::ActionSteps und
   actions.reserve = reserve == "stop" ? rules::ReserveKind::stop : rules::ReserveKind::safe_outputs;
   actions.do_steps = std::move(steps);
   actions.undo_steps = std::move(undo);
+  actions.takes_over = takes_over;
+  actions.whole = whole;
   return actions;
 }
 
 void bind_actions(py::module_& module) {
-  py::class_<rules::ActionStep>(
-      module, "ActionStep",
-      "One step of what a rule does: its kind, and the names and the plain value that it takes.")
-      .def(py::init([](std::string kind, std::string target, std::string name,
-                       std::optional<PropertyValue> value) {
-             return rules::ActionStep{std::move(kind), std::move(target), std::move(name), std::move(value)};
-           }),
-           py::arg("kind"), py::arg("target") = "", py::arg("name") = "", py::arg("value") = std::nullopt);
   py::class_<rules::RuleActions>(
       module, "RuleActions",
-      "What a rule does and undoes; no `undo`: nothing. reserve: stop or safe_outputs.")
+      R"(What a rule does. `undo`: what becomes the base at its end; without, what was there before comes back.
+
+reserve: stop or safe_outputs. takes_over: `undo` also counts where a person gave the base. whole: it does nothing
+while a part of it is taken.)")
       .def(py::init(&rule_actions), py::arg("do"), py::kw_only(), py::arg("undo") = rules::ActionSteps{},
-           py::arg("reserve") = "stop");
+           py::arg("reserve") = "stop", py::arg("takes_over") = false, py::arg("whole") = false);
 }
 
 void bind_told(py::module_& module) {
   py::class_<rules::Told>(module, "ToldDecision",
                           "A decision, and of `done` and `failed` what came of the action.")
       .def_readonly("decision", &rules::Told::decision)
+      .def_property_readonly(
+          "steps", [](const rules::Told& self) { return self.action.steps; }, "What was to be done.")
       .def_property_readonly("report", [](const rules::Told& self) { return self.action.report; })
       .def_property_readonly(
           "failure", [](const rules::Told& self) { return self.action.failure; },
@@ -104,7 +104,7 @@ void bind_rule_runner(py::module_& module) {
       R"(Rules at work beside the components of a host, on native threads: they need no Python to act.
 
 Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) for what cannot be there.)")
-      .def(py::init<PyHost&, std::vector<rules::Rule>, const std::vector<rules::RuleActions>&,
+      .def(py::init<PyHost&, std::vector<rules::Rule>, std::vector<rules::RuleActions>,
                     std::map<std::string, std::string>, PyRuleRunner*>(),
            py::arg("host"), py::arg("rules"), py::arg("actions"),
            py::arg("topics") = std::map<std::string, std::string>{}, py::arg("before") = nullptr,
@@ -119,6 +119,10 @@ goes on, and what it receives in between counts. It is of no use afterwards, and
       .def(
           "stop", [](PyRuleRunner& self) { self.runner().stop(); }, Unlocked(),
           "Nothing is done any more; what is in effect stays so. May be called again.")
+      .def(
+          "reset", [](PyRuleRunner& self, const std::string& rule) { return self.runner().reset(rule); },
+          py::arg("rule"), Unlocked(),
+          "End an active rule whose condition is false, be it latched; '': done, else why not.")
       .def(
           "wait_told",
           [](PyRuleRunner& self, time_ns_t timeout_ns) { return self.runner().wait_told(timeout_ns); },

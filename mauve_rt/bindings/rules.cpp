@@ -90,15 +90,23 @@ void bind_rules_of_an_engine(py::module_& module) {
       .def(py::init([](std::string name, rules::When when, time_ns_t for_ns, bool undoes,
                        time_ns_t undo_for_ns, time_ns_t cooldown_ns, std::int64_t priority,
                        std::vector<std::string> about, std::optional<time_ns_t> otherwise_after_ns,
-                       bool takes_over) {
-             return rules::Rule{std::move(name),    std::move(when), for_ns,   undoes,
-                                undo_for_ns,        cooldown_ns,     priority, std::move(about),
-                                otherwise_after_ns, takes_over};
+                       bool safety, bool latch) {
+             return rules::Rule{.name = std::move(name),
+                                .when = std::move(when),
+                                .for_ns = for_ns,
+                                .undoes = undoes,
+                                .undo_for_ns = undo_for_ns,
+                                .cooldown_ns = cooldown_ns,
+                                .priority = priority,
+                                .about = std::move(about),
+                                .otherwise_after_ns = otherwise_after_ns,
+                                .safety = safety,
+                                .latch = latch};
            }),
            py::arg("name"), py::arg("when"), py::kw_only(), py::arg("for_ns") = 0, py::arg("undoes") = false,
            py::arg("undo_for_ns") = 0, py::arg("cooldown_ns") = 0, py::arg("priority") = 0,
            py::arg("about") = std::vector<std::string>{}, py::arg("otherwise_after_ns") = std::nullopt,
-           py::arg("takes_over") = false);
+           py::arg("safety") = false, py::arg("latch") = false);
   py::class_<rules::SignalSpec>(module, "SignalSpec", "What one condition hears.")
       .def_property_readonly(
           "kind",
@@ -148,7 +156,9 @@ void bind_answers(py::module_& module) {
           "Whether its condition is true or false: until something was received of what it is about, it is "
           "neither.")
       .def_readonly("in_effect", &rules::RuleStatus::in_effect)
-      .def_readonly("changed_by_another", &rules::RuleStatus::changed_by_another)
+      .def_readonly("is_at_work", &rules::RuleStatus::is_at_work,
+                    "Active, or something is left to be undone or under way.")
+      .def_readonly("active", &rules::RuleStatus::active, "Whether what it does is wanted.")
       .def_readonly("since_ns", &rules::RuleStatus::since_ns)
       .def_readonly("measured", &rules::RuleStatus::measured)
       .def_property_readonly("next",
@@ -194,18 +204,11 @@ Raises MauveError (invalid_argument) for what cannot be so, IndexError for a rul
           "Whether all that the rule is about is there and runs.")
       .def(
           "set_in_place",
-          [](PyRuleEngine& self, std::size_t rule, const std::string& act, bool in_place, time_ns_t now_ns) {
-            self.engine.set_in_place(self.rule(rule), act_of(act), in_place, now_ns);
+          [](PyRuleEngine& self, std::size_t rule, const std::string& act, bool in_place) {
+            self.engine.set_in_place(self.rule(rule), act_of(act), in_place);
           },
-          py::arg("rule"), py::arg("act"), py::arg("in_place"), py::arg("now_ns"),
-          "Whether what the act would do is in effect.")
-      .def(
-          "set_own",
-          [](PyRuleEngine& self, std::size_t rule, bool is_own) {
-            self.engine.set_own(self.rule(rule), is_own);
-          },
-          py::arg("rule"), py::arg("is_own"),
-          "Whether what its do would do is in effect by a rule; it is until the opposite is said.")
+          py::arg("rule"), py::arg("act"), py::arg("in_place"),
+          "Whether nothing is left to be done by the act.")
       .def(
           "set_ready",
           [](PyRuleEngine& self, std::size_t rule, const std::string& act, bool ready) {
@@ -214,11 +217,18 @@ Raises MauveError (invalid_argument) for what cannot be so, IndexError for a rul
           py::arg("rule"), py::arg("act"), py::arg("ready"), "Whether the act could begin at once.")
       .def(
           "adopt",
+          [](PyRuleEngine& self, std::size_t rule, bool is_active, time_ns_t now_ns) {
+            self.engine.adopt(self.rule(rule), is_active, now_ns);
+          },
+          py::arg("rule"), py::arg("is_active"), py::arg("now_ns"),
+          "The rule is active since before; or what it did is not undone yet.")
+      .def(
+          "reset",
           [](PyRuleEngine& self, std::size_t rule, time_ns_t now_ns) {
-            self.engine.adopt(self.rule(rule), now_ns);
+            return self.engine.reset(self.rule(rule), now_ns);
           },
           py::arg("rule"), py::arg("now_ns"),
-          "What the rule does is in effect already: it is undone when it is time.")
+          "End an active rule whose condition is false, be it latched; False: it is not so.")
       .def(
           "forget",
           [](PyRuleEngine& self, std::optional<std::size_t> rule) {

@@ -27,6 +27,8 @@ void bind_descriptions(py::module_& module);
 void bind_registry(py::module_& module);
 /// Registers TaskSetting and the table of them.
 void bind_settings(py::module_& module);
+/// Registers ActionStep, Overlays and what they tell of; before Architecture.
+void bind_overlays(py::module_& module);
 /// Registers Architecture and Component.
 void bind_architecture(py::module_& module);
 /// Registers StepReport, RealtimeStatus and TraceDrain.

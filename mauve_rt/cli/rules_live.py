@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.cli.arguments import add_executor_and_json
-from mauve_rt.cli.verb import OK
+from mauve_rt.cli.verb import BAD_USAGE, OK
 from mauve_rt.supervision.truth import truth_word
 
 
@@ -24,6 +24,13 @@ def add_load(parser: argparse.ArgumentParser) -> None:
         default="",
         metavar="FILE",
         help="rules file, on the executor's computer (default: read the present file again)",
+    )
+    parser.add_argument(
+        "--release",
+        action="append",
+        default=[],
+        metavar="RULE",
+        help="let go of this active safety rule where the file lacks it; may be repeated",
     )
 
 
@@ -65,8 +72,56 @@ def load_rules(args: argparse.Namespace) -> int:
     from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
     path = str(Path(args.file).absolute()) if args.file else ""
+    request = LoadRules.Request(path=path, release=args.release)
     with connected(first=True) as client:
-        reply = client.call(LoadRules, f"{args.executor}/load_rules", LoadRules.Request(path=path))
+        reply = client.call(LoadRules, f"{args.executor}/load_rules", request)
+    return print_reply(reply, as_json=args.json)
+
+
+def add_reset(parser: argparse.ArgumentParser) -> None:
+    """Whose, and what."""
+    add_executor_and_json(parser)
+    parser.add_argument("rule", nargs="?", default="", metavar="RULE", help="name of the latched rule")
+    parser.add_argument(
+        "--value",
+        default="",
+        metavar="COMPONENT",
+        help="let the values of this component be put in again that a probation or a fault has rejected",
+    )
+
+
+def reset(args: argparse.Namespace) -> int:
+    """End a latched rule, or a quarantine."""
+    from mauve_msgs.srv import ResetRule  # noqa: PLC0415
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.views import print_reply  # noqa: PLC0415
+
+    if bool(args.rule) == bool(args.value):
+        print("mauve rules reset: name either a rule or --value COMPONENT", file=sys.stderr)
+        return BAD_USAGE
+    request = ResetRule.Request(rule=args.rule, component=args.value)
+    with connected(first=True) as client:
+        reply = client.call(ResetRule, f"{args.executor}/reset_rule", request)
+    return print_reply(reply, as_json=args.json)
+
+
+def add_release(parser: argparse.ArgumentParser) -> None:
+    """Whose, and over which."""
+    add_executor_and_json(parser)
+    parser.add_argument(
+        "rule", nargs="?", default="", metavar="RULE", help="only what is over this rule (default: all of it)"
+    )
+
+
+def release(args: argparse.Namespace) -> int:
+    """End what was put over rules."""
+    from mauve_msgs.srv import ReleaseRules  # noqa: PLC0415
+    from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.views import print_reply  # noqa: PLC0415
+
+    request = ReleaseRules.Request(rule=args.rule)
+    with connected(first=True) as client:
+        reply = client.call(ReleaseRules, f"{args.executor}/release_rules", request)
     return print_reply(reply, as_json=args.json)
 
 
@@ -76,8 +131,8 @@ def _row(rule: Any) -> tuple[str, str, str, str, str]:
         return "no", "-", "what it is about does not run", "-", _prepared(rule)
     holds = f"{truth_word(rule)} for {rule.since_s:.1f} s"
     stands = "in effect" if rule.in_effect else "watching"
-    if rule.changed_by_another:
-        stands = "waits: another requester changed what it did"
+    if rule.active and not rule.in_effect:
+        stands = "active, not done yet"
     coming = f"{rule.next} in {rule.next_in_s:.1f} s" if rule.next else "-"
     return "yes", holds, stands, coming, _prepared(rule)
 

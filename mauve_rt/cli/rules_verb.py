@@ -137,6 +137,18 @@ SUB_VERBS = (
     Verb("list", "show the state of each rule of an executor", rules_live.add_list, rules_live.list_rules),
     Verb("load", "replace the rules of an executor, all or none", rules_live.add_load, rules_live.load_rules),
     Verb(
+        "reset",
+        "end a latched rule whose cause is gone, or the quarantine of rejected values",
+        rules_live.add_reset,
+        rules_live.reset,
+    ),
+    Verb(
+        "release",
+        "end what persons put over rules",
+        rules_live.add_release,
+        rules_live.release,
+    ),
+    Verb(
         "replay",
         "run rules against a bag, and compare their actions with the recorded ones",
         rules_of_bags.add_replay,

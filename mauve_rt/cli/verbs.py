@@ -29,6 +29,7 @@ from mauve_rt.cli.completion import (
 from mauve_rt.cli.verb import BAD_USAGE, OK, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
+OVER_RULES = "rules"  # of a request over the rules: all but safety rules
 _LOOK_S = 0.02  # between two looks at what a change cost
 
 
@@ -75,6 +76,32 @@ def _add_force(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="give up a component whose state does not end in time: it becomes FAULTED",
     )
+
+
+def _add_over(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--over-rules",
+        nargs="?",
+        const=OVER_RULES,
+        default="",
+        metavar="NAME",
+        help="where a rule holds what is to be changed: put this above all rules but safety rules, or "
+        "above the safety rule NAME, until `mauve rules release` or the rule's end",
+    )
+
+
+def _add_over_and_base(parser: argparse.ArgumentParser) -> None:
+    _add_over(parser)
+    parser.add_argument(
+        "--base",
+        action="store_true",
+        help="where a rule holds what is to be changed: change what comes back when the rule ends",
+    )
+
+
+def _over_of(args: argparse.Namespace) -> dict[str, Any]:
+    """Fields of a request."""
+    return {"over": args.over_rules, "base": args.base}
 
 
 def _add_phase_timeout(parser: argparse.ArgumentParser) -> None:
@@ -126,11 +153,17 @@ def _add_stop(parser: argparse.ArgumentParser) -> None:
     _add_force(parser)
 
 
+def _add_start(parser: argparse.ArgumentParser) -> None:
+    _add_request(parser)
+    _add_over(parser)
+
+
 def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_timed_request(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
     _add_probation(parser)
+    _add_over_and_base(parser)
     completed_by(parser.add_argument("core", help="the new core, package/Class"), complete_cores)
 
 
@@ -142,6 +175,7 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     _add_timeout(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
+    _add_over_and_base(parser)
 
 
 def _add_reload(parser: argparse.ArgumentParser) -> None:
@@ -172,6 +206,7 @@ def _add_set(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("value", help="the new value, as in an architecture file")
     _add_record(parser)
     _add_timeout(parser)
+    _add_over_and_base(parser)
 
 
 def _property(text: str) -> tuple[str, str]:
@@ -210,7 +245,7 @@ def _stop(args: argparse.Namespace) -> int:
 def _start(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Start  # noqa: PLC0415
 
-    return _request(args, Start, "start", component=args.component)
+    return _request(args, Start, "start", component=args.component, over=args.over_rules)
 
 
 def _replace_core(args: argparse.Namespace) -> int:
@@ -225,6 +260,7 @@ def _replace_core(args: argparse.Namespace) -> int:
         commit_timeout_s=args.timeout,
         force=args.force,
         **_probation_of(args),
+        **_over_of(args),
     )
 
 
@@ -252,6 +288,7 @@ def _reconfigure(args: argparse.Namespace) -> int:
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
         force=args.force or change.force,
+        **_over_of(args),
     )
 
 
@@ -277,7 +314,8 @@ def _set(args: argparse.Namespace) -> int:
 
     component, name = args.property
     step = ReconfigurationStep(kind="set_property", target=component, name=name, value=args.value)
-    return _request(args, Reconfigure, "reconfigure", steps=[step], commit_timeout_s=args.timeout)
+    fields = {"steps": [step], "commit_timeout_s": args.timeout, **_over_of(args)}
+    return _request(args, Reconfigure, "reconfigure", **fields)
 
 
 def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
@@ -433,7 +471,7 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 VERBS = (
     Verb("list", "show the components of an executor", add_executor_and_json, _list),
     Verb("stop", "stop a component", _add_stop, _stop),
-    Verb("start", "start a stopped component", _add_request, _start),
+    Verb("start", "start a stopped component", _add_start, _start),
     Verb(
         "replace-core",
         "replace the core of a component, also while the component runs",

@@ -43,7 +43,8 @@ def check_form(request: Request) -> None:
     if request.reload is not None:
         _check_reload(request.reload)
         return
-    if not 1 <= len(request.steps) <= MAX_STEPS:
+    _check_rule(request)
+    if not (0 if request.release else 1) <= len(request.steps) <= MAX_STEPS:
         found = f"of {len(request.steps)} steps" if request.steps else "without a step"
         raise RefusalError(Code.INVALID, f"a transaction {found}: expected 1 to {MAX_STEPS}")
     for number, step in enumerate(request.steps, start=1):
@@ -88,6 +89,13 @@ def _check_reload(order: ReloadOrder) -> None:
     if order.back and order.probation:
         text = "the way back needs no probation: that code ran before; leave probation_s out"
         raise RefusalError(Code.INVALID, text)
+
+
+def _check_rule(request: Request) -> None:
+    if request.release and not request.rule:
+        raise RefusalError(Code.INVALID, "a release is of a rule: name it")
+    if request.rule and (request.over or request.base):
+        raise RefusalError(Code.INVALID, "over and base are of persons' requests: leave them or the rule out")
 
 
 def _check_recording(order: RecordingOrder) -> None:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Protocol
 
 from mauve_rt._kernel import (
+    ActionStep,
     Committed,
     ComponentDescription,
     ResourceDescription,
@@ -33,6 +34,7 @@ from mauve_rt.control.requests import (
 )
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.steps import Bound, Plan
+from mauve_rt.control.wishes import step_of, wanted
 from mauve_rt.errors import MauveError, error_code, internal_error_text, one_line
 from mauve_rt.model.schema import ResourceModel
 
@@ -158,6 +160,46 @@ class Control:
         order = ReloadOrder(targets=(record.component,), back=True, generation=generation)
         return Request(reload=order, requested_by="kernel", cause=f"probation reverted: {record.reason}")
 
+    def release(self, rule: str) -> Outcome:
+        """End what persons put over a rule, or over all ("")."""
+        with self._changing:
+            taken_off = self._runtime.architecture.overlays.take_off(rule)
+            return self._wanted_again(
+                f"released: {_words_of(taken_off)}" if taken_off else "nothing is over it"
+            )
+
+    def forgive(self, component: str) -> Outcome:
+        """End the quarantine of the values that were rejected of a component."""
+        overlays = self._runtime.architecture.overlays
+        with self._changing:
+            found = [step for step in overlays.rejected() if step.target == component]
+            for step in found:
+                overlays.forgive(step)
+            words = ", ".join(step.name or step.kind for step in found)
+            return self._wanted_again(f"may be put in again: {words}" if found else "nothing was rejected")
+
+    def _wanted_again(self, message: str) -> Outcome:
+        """What is wanted may be another: the executor's own rules see to theirs, this to supervisors'."""
+        architecture = self._runtime.architecture
+        architecture.note_overlays()
+        failures = []
+        for overlay in architecture.overlays.active():
+            if not overlay.source:
+                continue
+            steps = tuple(step_of(one) for one in overlay.assigns)
+            request = Request(
+                steps=steps, rule=overlay.rule, requested_by=overlay.source, priority=overlay.priority
+            )
+            outcome = self._outcome(request)
+            if not outcome.success:
+                failures.append(f"rule {overlay.rule}: {outcome.message}")
+        revision = self._runtime.observe().revision
+        if failures:
+            return Outcome(
+                code=Code.PREPARE_FAILED, message="; ".join([message, *failures]), revision=revision
+            )
+        return Outcome(code=Code.OK, message=message, revision=revision)
+
     def remember(self, request: Request, outcome: Outcome) -> None:
         """Note what came of a request that somebody else carried out: who repeats it gets that."""
         with self._answered:
@@ -202,6 +244,14 @@ class Control:
         self, request: Request, parts: Sequence[ComponentDescription], *, expected_revision: int
     ) -> Outcome:
         check_time(request, self._runtime)
+        with wanted(request, self._runtime) as now:
+            if not now.steps and (request.steps or request.release) and not request.dry_run:
+                return Outcome(code=Code.OK, message=_NOTHING_NOW[bool(request.rule)])
+            return self._carry_out_now(now, parts, expected_revision=expected_revision)
+
+    def _carry_out_now(
+        self, request: Request, parts: Sequence[ComponentDescription], *, expected_revision: int
+    ) -> Outcome:
         taken = {} if request.is_direct else self._still_taken(parts)
         plan = Plan(request.steps, self._runtime, parts, limits=self._limits, taken=taken)
         if len(request.steps) == 1 and request.steps[0].kind in ("start", "stop"):  # be it a dry run
@@ -349,12 +399,22 @@ class Control:
         else:
             host.start(step.target, request.clock_ns or None, expected_revision=expected_revision)
             message = f"component '{step.target}' is started"
-        self._runtime.architecture.note_author(step.target, "state", request.author)
+        self._runtime.architecture.note_author(ActionStep(step.kind, step.target), request.author)
         return Outcome(code=Code.OK, message=message, report=(Report(step=step.kind, component=step.target),))
 
 
+_NOTHING_NOW = {
+    True: "nothing is to be done: it is so, or a rule of higher rank sets it",
+    False: "it is in force once the rules that set it have ended",
+}
+
+
+def _words_of(elements: Sequence[tuple[str, str]]) -> str:
+    return ", ".join(f"{name or 'presence'} of {target}" for target, name in elements)
+
+
 def _is_change(request: Request, outcome: Outcome) -> bool:
-    return bool(request.steps or outcome.report) and not request.dry_run
+    return bool(request.steps or request.release or outcome.report) and not request.dry_run
 
 
 def _replaced_core(request: Request, parts: Sequence[ComponentDescription]) -> tuple[str, str]:

@@ -62,6 +62,7 @@ class RefusalError(Exception):
 
 
 BY_RELOAD = "reload by "  # how the author begins of a reload's changes
+OVER_RULES = "rules"  # all that are no safety rules
 BY_RULE = "rule "  # how the author begins of what a rule does
 
 
@@ -108,7 +109,11 @@ class Request:
     expected_revision: int = 0
     requested_by: str = ""
     cause: str = ""
-    rule: str = ""  # whose action it is
+    rule: str = ""  # whose action it is: its steps are what it wants while it is active
+    release: bool = False  # the rule ends; its steps become the base
+    priority: int = 0  # of the rule
+    over: str = ""  # a person's request over the rules: OVER_RULES, or the name of a safety rule
+    base: bool = False  # a person's request about what comes back once rules have ended
     dry_run: bool = False
     timeout_s: float = 0.0  # 0: the default
     force: bool = (

@@ -13,6 +13,7 @@ from mauve_rt._kernel import (
     ComponentDescription,
     Deployer,
     Host,
+    Overlays,
     PluginRegistry,
     ProbationRecord,
     RealtimeStatus,
@@ -237,6 +238,11 @@ class Runtime:
         if self._architecture is None:
             raise RuntimeError("not configured")
         return self._architecture
+
+    def overlays(self) -> Overlays | None:
+        """What rules and persons want; None while unconfigured. From any thread."""
+        architecture = self._architecture
+        return architecture.overlays if architecture is not None else None
 
     # ---- what it looks like now
 

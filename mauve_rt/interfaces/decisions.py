@@ -24,7 +24,13 @@ def architecture_view(state: Any) -> ArchitectureView:
         )
         for status in state.components
     }
-    return ArchitectureView(state.instance_id, state.revision, components, frozenset(state.rules))
+    return ArchitectureView(
+        state.instance_id,
+        state.revision,
+        components,
+        rules=frozenset(state.rules),
+        active=frozenset(state.active_rules),
+    )
 
 
 def _authors(told: Iterable[str]) -> dict[str, str]:

@@ -18,9 +18,12 @@ from mauve_msgs.msg import (
     StepReport,
     TraceArchitecture,
 )
+from mauve_msgs.msg import HeldElement as HeldElementMessage
 from mauve_rt._kernel import (
+    ActionStep,
     ComponentDescription,
     DescribedState,
+    HeldElement,
     PortDescription,
     ProbationRecord,
     ShadowRecord,
@@ -28,6 +31,7 @@ from mauve_rt._kernel import (
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
+from mauve_rt.control.wishes import step_of
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.words import cut, shown
 
@@ -165,6 +169,7 @@ def architecture_state(
     `error`: why the last lifecycle transition failed; `rules`: that the executor runs.
     """
     authors = runtime.authors()
+    overlays = runtime.overlays()
     return ArchitectureState(
         stamp=stamp,
         instance_id=runtime.instance_id,
@@ -184,7 +189,25 @@ def architecture_state(
         realtime=realtime_status(runtime),
         error=error,
         rules=list(rules),
+        active_rules=[overlay.rule for overlay in overlays.active()] if overlays is not None else [],
+        held=[_held(each) for each in overlays.table()] if overlays is not None else [],
     )
+
+
+def _held(element: HeldElement) -> Any:
+    wanted = element.wanted
+    return HeldElementMessage(
+        target=element.target,
+        element=element.element,
+        base=_step_text(element.base),
+        wanted=_step_text(wanted.step),
+        holder=f"rule {wanted.rule}" if wanted.by == "rule" else wanted.by,
+        rules=element.rules,
+    )
+
+
+def _step_text(assignment: ActionStep | None) -> str:
+    return cut(str(step_of(assignment)), MAX_TEXT) if assignment is not None else ""
 
 
 def _probation(record: ProbationRecord) -> Any:

@@ -8,6 +8,7 @@ from mauve_rt._kernel import NOT_MEASURED, RuleFacts, ToldDecision
 from mauve_rt.control.reports import message_of, reports_of
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.wishes import step_of
 from mauve_rt.interfaces.decisions import UNKNOWN_S, decision_message
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.decisions import decision_of
@@ -49,6 +50,7 @@ class DecisionMessages:
             self._rules,
             name=self._name,
             failure=told.failure,
+            reason=_what_was_done(rule, told),
             revision=done.outcome.revision if done is not None else self._runtime.revision,
             message=done.outcome.message if done is not None else "",
         )
@@ -76,7 +78,7 @@ class DecisionMessages:
         decision = told.decision
         if decision.act == "otherwise" or (told.report is None and not told.failure):
             return None
-        steps: tuple[Step, ...] = tuple(rule.steps(decision.act))
+        steps = _steps_of(rule, told)
         revision = self._runtime.observe().revision
         if told.report is None:
             outcome = Outcome(code=Code.PREPARE_FAILED, message=told.failure, revision=revision)
@@ -102,6 +104,19 @@ class DecisionMessages:
         return bound_of(rule, periods, beside=self._rules, act=act)
 
 
+def _steps_of(rule: Rule, told: ToldDecision) -> tuple[Step, ...]:
+    """What was done: what the rule says of it, or what came back."""
+    known = (*rule.do, *rule.steps("undo"))
+    return tuple(step_of(step, known) for step in told.steps)
+
+
+def _what_was_done(rule: Rule, told: ToldDecision) -> str:
+    made = told.decision
+    if made.decision != "done" or made.act == "otherwise":
+        return ""
+    return f"{made.act}: {', '.join(map(str, _steps_of(rule, told)))}"
+
+
 def rule_info(facts: RuleFacts, now_ns: int) -> Any:
     """RuleInfo of a rule of the executor's own."""
     status = facts.status
@@ -112,8 +127,8 @@ def rule_info(facts: RuleFacts, now_ns: int) -> Any:
         armed=status.armed,
         holds=status.holds,
         known=status.known,
+        active=status.active,
         in_effect=status.in_effect,
-        changed_by_another=status.changed_by_another,
         ready=facts.ready,
         next=status.next or "",
         next_in_s=UNKNOWN_S if next_ns is None else max(next_ns - now_ns, 0) / 1e9,

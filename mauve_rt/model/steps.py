@@ -85,6 +85,7 @@ class _StepPart(Kind):
 
 
 STEPS = ListOf(_StepPart(), few=1)
+ANY_STEPS = ListOf(_StepPart())  # or none
 
 
 class Change(Section):

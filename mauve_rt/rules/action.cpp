@@ -11,8 +11,6 @@ namespace mauve::rules {
 
 namespace {
 
-constexpr std::string_view kByRule = "rule ";
-
 Ended how_ended(ErrorCode code) noexcept {
   switch (code) {
     case ErrorCode::wrong_revision:
@@ -59,14 +57,19 @@ std::unique_ptr<PreparedTransaction> try_steps(const ActionSteps& steps, Transac
 
 std::string rule_author(const std::string& rule) { return rule.empty() ? "" : std::string(kByRule) + rule; }
 
-bool is_by_rules(const ActionSteps& steps, const std::vector<Authored>& authors) {
+std::vector<Assigned> assigned(const ActionSteps& steps) {
+  std::vector<Assigned> all;
   const Transaction transaction = make_transaction(steps);
-  return std::all_of(transaction.steps().begin(), transaction.steps().end(), [&](const auto& step) {
-    return step->is_for_all() || std::any_of(authors.begin(), authors.end(), [&](const Authored& one) {
-             return one.target == step->target && one.element == step->element() &&
-                    one.author.starts_with(kByRule);
-           });
-  });
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    const TransactionStep& step = *transaction.steps()[i];
+    const bool is_kept = step.element() != "shadow" && steps[i].kind != "configure" &&
+                         steps[i].kind != "promote" && steps[i].kind != "revert_core";
+    all.push_back({.element = step.is_for_all() || !is_kept
+                                  ? Element()
+                                  : Element{.target = step.target, .name = step.element()},
+                   .step = steps[i]});
+  }
+  return all;
 }
 
 Transaction make_transaction(const ActionSteps& steps, const std::string& rule) {
@@ -77,27 +80,36 @@ Transaction make_transaction(const ActionSteps& steps, const std::string& rule) 
   return transaction;
 }
 
-Action::Action(ActionSteps steps, const TransactionOptions& options, std::string rule)
-    : steps_(std::move(steps)),
-      options_(options),
-      rule_(std::move(rule)),
-      is_preparable_(can_be_prepared(steps_)) {}
+Action::Action(bool exists, const TransactionOptions& options, std::string rule)
+    : exists_(exists), options_(options), rule_(std::move(rule)) {}
 
 // ---- the preparation thread
 
-bool Action::is_wanting(std::uint64_t revision) const {
+bool Action::is_wanting(std::uint64_t revision, std::uint32_t based_on) const {
   const Stage stage = stage_.load(std::memory_order_acquire);
+  if (stage > Stage::ready) return false;
+  // relaxed: this thread wrote it
+  if (based_on_.load(std::memory_order_relaxed) != based_on || tried_at_ == 0) return true;
   if (stage == Stage::ready && is_preparable_) return !prepared_->is_current();
-  return (stage == Stage::idle || stage == Stage::ready) && tried_at_ != revision;
+  return tried_at_ != revision;
 }
 
-bool Action::prepare(Host& host, std::uint64_t revision) {
-  if (!is_wanting(revision)) return false;
+bool Action::prepare(Host& host, std::uint64_t revision, ActionSteps steps, std::uint32_t based_on) {
+  const bool is_same =
+      stage_.load(std::memory_order_acquire) == Stage::ready && is_preparable_ && steps == steps_;
+  if (is_same && prepared_->is_current()) {
+    based_on_.store(based_on, std::memory_order_release);
+    return true;
+  }
   const bool was_ready = put_away();
   if (stage_.load(std::memory_order_acquire) != Stage::idle) return false;  // it has just begun
   tried_at_ = revision;
+  steps_ = std::move(steps);
+  is_preparable_ = can_be_prepared(steps_);
+  based_on_.store(based_on, std::memory_order_release);
+  problem_.clear();
+  if (steps_.empty()) return was_ready;
   try {
-    problem_.clear();
     prepared_ = try_steps(steps_, options_, host, rule_);
     stage_.store(Stage::ready, std::memory_order_release);
     return true;
@@ -107,12 +119,12 @@ bool Action::prepare(Host& host, std::uint64_t revision) {
   }
 }
 
-void Action::try_after(const ActionSteps& before, Host& host) {
+void Action::try_after(const ActionSteps& before, const ActionSteps& steps, Host& host) {
   ActionSteps both = before;
-  both.insert(both.end(), steps_.begin(), steps_.end());
+  both.insert(both.end(), steps.begin(), steps.end());
   try {
     problem_.clear();
-    try_steps(both, options_, host, rule_);
+    if (!both.empty()) try_steps(both, options_, host, rule_);
   } catch (const std::exception& failure) {
     problem_ = failure.what();
   }
@@ -142,6 +154,7 @@ void Action::complete() {
   MAUVE_EXPECTS(stage_.load(std::memory_order_relaxed) == Stage::heard);  // relaxed: this thread has seen it
   if (prepared_ != nullptr) {
     report_.emplace();
+    report_->steps = steps_;
     try {
       report_->report = prepared_->complete();
     } catch (const std::exception& failure) {
@@ -156,6 +169,7 @@ void Action::complete() {
 void Action::carry_out(Host& host) {
   MAUVE_EXPECTS(!is_preparable_ && committed_ == nullptr);
   report_.emplace();
+  report_->steps = steps_;
   how_ = Ended::refused;
   try {
     committed_ = host.make(make_transaction(steps_, rule_), options_);

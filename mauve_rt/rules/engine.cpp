@@ -2,6 +2,7 @@
 #include "mauve_rt/rules/engine.hpp"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
@@ -39,7 +40,15 @@ Decided decided_of(Truth truth) noexcept {
   return truth == Truth::yes ? Decided::condition_true : Decided::condition_false;
 }
 
-constexpr Act opposite(Act act) noexcept { return act == Act::do_ ? Act::undo : Act::do_; }
+/// Of a rule that is released: it only ends.
+class Never final : public Condition {
+ public:
+  void arm(time_ns_t now_ns) noexcept override { armed_ns_ = now_ns; }
+  Look look(time_ns_t /*now_ns*/) noexcept override { return {.since_ns = armed_ns_}; }
+
+ private:
+  time_ns_t armed_ns_{0};
+};
 
 }  // namespace
 
@@ -54,24 +63,23 @@ struct Engine::Life {
   std::vector<bool> contends;  // with the rule of that number: both are about one component
   Look last{};
   Truth told{Truth::no};  // what was said of the condition last
-  bool is_due{false};   // `do` is: the condition has held for long enough, and is not known to be false since
-  bool goes_on{false};  // its condition was armed by the engine before
+  bool goes_on{false};    // its condition was armed by the engine before
   bool armed{false};
-  bool in_effect{false};
-  bool changed_by_another{false};
-  bool is_own{true};                          // what its `do` would do is there by a rule, if it is there
-  std::optional<Act> under_way{};             // do or undo
-  Look begun{};                               // the condition, as the last action began
-  time_ns_t begun_held_ns{0};                 // for so long after its dwell time it owed nothing
-  bool is_held{false};                        // outranked, or in cooldown: it owes nothing
-  time_ns_t free_since_ns{INT64_MIN};         // it is no longer held
-  bool gives_way{false};                      // that is to be called off
-  bool acts_soon{false};                      // `do` is due, and what keeps it from it passes
-  bool otherwise_begun{false};                // since the condition has held
-  std::optional<time_ns_t> waits_since_ns{};  // since when `do` may be done and is not in effect
+  bool active{false};              // what it does is wanted
+  bool in_effect{false};           // and done, not undone yet
+  bool undone{false};              // that is to be confirmed: meanwhile another rule may have ended, too
+  bool is_looked_up{false};        // who hosts the engine finds out whether it is undone
+  std::optional<Act> under_way{};  // do or undo
+  Look turned{};                   // the condition, as it became active, or no longer
+  Look begun{};                    // the same of the last action
+  time_ns_t held_ns{0};            // for so long its cooldown held that back
+  bool gives_way{false};           // what is under way is to be called off
+  bool otherwise_begun{false};     // since it is active
+  std::optional<time_ns_t> waits_since_ns{};          // since when `do` may be done and is not in effect
   std::array<std::optional<bool>, kActs> in_place{};  // by Act; empty: nobody knows
   std::array<bool, kActs> ready{true, true, true};
-  time_ns_t not_before_ns{INT64_MIN};
+  time_ns_t cooled_ns{INT64_MIN};  // its cooldown is over
+  time_ns_t retry_ns{INT64_MIN};   // what failed is tried again
   int failures{0};
   std::pair<Act, Why> failed{};                  // the last one
   std::optional<std::pair<Act, Why>> excused{};  // the last reason given, so that it is given once
@@ -79,12 +87,20 @@ struct Engine::Life {
 
   /// When the condition will have been as it is for long enough.
   time_ns_t due_ns() const noexcept {
-    return later_by(last.since_ns, last.holds() ? rule.for_ns : (rule.undoes ? rule.undo_for_ns : 0));
+    if (rule.is_released) return INT64_MIN;
+    return later_by(last.since_ns, last.holds() ? rule.for_ns : rule.undo_for_ns);
   }
-  /// Whether there is something that it could do.
-  bool may_do() const noexcept { return !in_effect && !changed_by_another && !otherwise_begun; }
-  /// Whether what is in effect already is its own to undo.
-  bool is_undone_by_it() const noexcept { return is_own || rule.takes_over; }
+  /// Whether the condition asks for a change of what is wanted, once it has been so for long enough.
+  bool is_to_turn() const noexcept {
+    if (active) return rule.is_released || (last.truth == Truth::no && !rule.latch);
+    return last.holds() && !rule.is_released;
+  }
+  /// What is left to be done.
+  std::optional<Act> owed() const noexcept {
+    if (active && !in_effect && !otherwise_begun) return Act::do_;
+    if (!active && in_effect) return Act::undo;
+    return std::nullopt;
+  }
 };
 
 Engine::Engine(std::vector<Rule> rules, const Engine* before)
@@ -99,7 +115,7 @@ Engine::Engine(std::vector<Rule> rules, const Engine* before)
       return *signals_.back();
     };
     try {
-      life->condition = make_condition(rule.when, give);
+      life->condition = rule.is_released ? std::make_unique<Never>() : make_condition(rule.when, give);
     } catch (const Error& failure) {
       ErrorDetail detail = failure.detail();
       detail.component = "rule " + rule.name;
@@ -121,7 +137,8 @@ Engine::Engine(std::vector<Rule> rules, const Engine* before)
     }
   }
   std::sort(by_rank_.begin(), by_rank_.end(), [](const Life* a, const Life* b) {
-    return std::pair(b->rule.priority, a->index) < std::pair(a->rule.priority, b->index);
+    return std::tuple(b->rule.safety, b->rule.priority, a->index) <
+           std::tuple(a->rule.safety, a->rule.priority, b->index);
   });
   for (std::size_t rank = 0; rank < by_rank_.size(); ++rank) by_rank_[rank]->rank = rank;
   MAUVE_ENSURES(by_rank_.size() == lives_.size());
@@ -151,11 +168,12 @@ void Engine::go_on(std::size_t rule, Engine& before, std::size_t rule_before, bo
   }
   life.last = old.last;
   life.told = old.told;
-  life.is_due = old.is_due;
+  life.active = old.active;
+  life.turned = old.turned;
   life.in_effect = old.in_effect;
-  life.changed_by_another = old.changed_by_another;
+  life.undone = old.undone;
   life.otherwise_begun = old.otherwise_begun;
-  life.not_before_ns = old.not_before_ns;
+  life.cooled_ns = old.cooled_ns;
   life.goes_on = stays_armed && old.armed;
 }
 
@@ -170,13 +188,12 @@ void Engine::set_present(std::size_t rule, bool present, time_ns_t now_ns) noexc
   if (goes_on) return tell(life, {.stamp_ns = now_ns, .decided = Decided::armed});
   life.last = {.truth = Truth::unknown, .since_ns = now_ns};
   life.told = Truth::no;
-  life.is_due = false;
   life.excused.reset();
   life.waits_since_ns.reset();
   life.otherwise_begun = false;
   if (present) {
     life.condition->arm(now_ns);
-    if (life.in_effect) life.condition->assume();
+    if (life.active) life.condition->assume();
   }
   tell(life, {.stamp_ns = now_ns, .decided = present ? Decided::armed : Decided::disarmed});
 }
@@ -185,29 +202,35 @@ void Engine::arm(time_ns_t now_ns) noexcept {
   for (const auto& life : lives_) set_present(life->index, true, now_ns);
 }
 
-void Engine::set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t now_ns) noexcept {
+void Engine::set_in_place(std::size_t rule, Act act, bool in_place) noexcept {
   Life& life = *lives_[rule];
   life.in_place[index_of(act)] = in_place;
-  const bool is_undone = act == Act::do_ && !in_place && life.in_effect && !life.under_way;
-  if (!is_undone) return;
-  life.in_effect = false;
-  life.changed_by_another = true;
-  suppress(life, Act::do_, Why::changed_by_another, now_ns);
+  // What is wanted, or what is there, is another: it is done once more.
+  if (act == Act::do_ && !in_place && life.active && !life.under_way) life.in_effect = false;
+  if (act != Act::undo) return;
+  life.is_looked_up = true;
+  if (!life.active && std::exchange(life.undone, false) && !in_place) life.in_effect = true;
 }
-
-void Engine::set_own(std::size_t rule, bool is_own) noexcept { lives_[rule]->is_own = is_own; }
 
 void Engine::set_ready(std::size_t rule, Act act, bool ready) noexcept {
   lives_[rule]->ready[index_of(act)] = ready;
 }
 
-void Engine::adopt(std::size_t rule, time_ns_t now_ns) noexcept {
+void Engine::adopt(std::size_t rule, bool is_active, time_ns_t now_ns) noexcept {
   Life& life = *lives_[rule];
-  if (life.in_effect || !life.is_undone_by_it()) return;
+  if (life.active == is_active && life.in_effect) return;
+  life.active = is_active;
   life.in_effect = true;
-  life.in_place = {true, false};
+  life.in_place = {};
   life.condition->assume();
   tell(life, {.stamp_ns = now_ns, .decided = Decided::adopted});
+}
+
+bool Engine::reset(std::size_t rule, time_ns_t now_ns) noexcept {
+  Life& life = *lives_[rule];
+  if (!life.active || life.last.truth != Truth::no) return false;
+  turn(life, now_ns);
+  return true;
 }
 
 void Engine::forget() noexcept {
@@ -217,13 +240,11 @@ void Engine::forget() noexcept {
 void Engine::forget(std::size_t rule) noexcept {
   if (pending_ && pending_->rule == rule) pending_.reset();
   Life& life = *lives_[rule];
-  life.armed = life.in_effect = life.changed_by_another = life.gives_way = life.acts_soon = false;
-  life.otherwise_begun = false;
+  life.armed = life.active = life.in_effect = life.undone = life.gives_way = life.otherwise_begun = false;
   life.under_way.reset();
   life.in_place = {};
-  life.is_own = true;
   life.ready = {true, true, true};
-  life.not_before_ns = INT64_MIN;
+  life.cooled_ns = INT64_MIN;
   life.failures = 0;
   life.excused.reset();
   life.unready_since_ns.reset();
@@ -234,13 +255,14 @@ void Engine::forget(std::size_t rule) noexcept {
 
 time_ns_t Engine::step(time_ns_t now_ns) noexcept {
   pending_.reset();
-  for (const auto& life : lives_) {
-    life->acts_soon = false;
-    if (life->armed) look(*life, now_ns);
+  for (Life* life : by_rank_) {
+    if (!life->armed) continue;
+    look(*life, now_ns);
+    if (life->is_to_turn() && now_ns >= life->due_ns()) turn_after_cooldown(*life, now_ns);
   }
   for (Life* life : by_rank_) {
     if (!life->armed) continue;
-    const auto act = wanted(*life, now_ns);
+    const auto act = life->owed();
     if (act != Act::do_) life->waits_since_ns.reset();
     if (act) consider(*life, *act, now_ns);
   }
@@ -252,35 +274,50 @@ time_ns_t Engine::step(time_ns_t now_ns) noexcept {
 }
 
 void Engine::look(Life& life, time_ns_t now_ns) noexcept {
-  const bool held = life.last.holds();
   life.last = life.condition->look(now_ns);
   const Truth truth = life.last.truth;
-  if (life.last.holds() != held) {
-    life.failures = 0;
-    life.excused.reset();
-    life.unready_since_ns.reset();
-    life.otherwise_begun = false;
-    life.is_held = false;
-    life.free_since_ns = INT64_MIN;
-  }
-  // That nothing is known yet is no news, but where something is in effect.
-  if (truth == life.told || (truth == Truth::unknown && life.told == Truth::no && !life.in_effect)) return;
+  // That nothing is known yet is no news, but where something is wanted.
+  if (truth == life.told || (truth == Truth::unknown && life.told == Truth::no && !life.active)) return;
   life.told = truth;
   tell(life, {.stamp_ns = now_ns, .decided = decided_of(truth)});
 }
 
-/// What the dwell times ask for, whether it may be done or not.
-std::optional<Act> Engine::wanted(Life& life, time_ns_t now_ns) noexcept {
-  const bool is_long_enough = now_ns >= life.due_ns();
-  if (life.last.truth == Truth::no) {
-    life.is_due = false;
-    if (!is_long_enough) return std::nullopt;
-    life.changed_by_another = false;
-    if (life.in_effect && !life.rule.undoes) life.in_effect = false;
-    return life.in_effect ? std::optional(Act::undo) : std::nullopt;
+void Engine::turn_after_cooldown(Life& life, time_ns_t now_ns) noexcept {
+  const Act act = life.active ? Act::undo : Act::do_;
+  if (!life.rule.is_released && now_ns < life.cooled_ns) {
+    if (!life.active || life.in_effect)
+      suppress(life, act, Why::cooldown, now_ns, nullptr, life.cooled_ns - now_ns);
+    return;
   }
-  life.is_due |= life.last.holds() && is_long_enough;
-  return life.is_due && life.may_do() ? std::optional(Act::do_) : std::nullopt;
+  const bool was_held = !life.rule.is_released && life.cooled_ns > life.due_ns();
+  life.held_ns = was_held ? life.cooled_ns - life.due_ns() : 0;
+  turn(life, now_ns);
+}
+
+/// What was found of rules about the same is of yesterday.
+void Engine::forget_found_beside(const Life& life) noexcept {
+  for (const auto& other : lives_) {
+    if (life.contends[other->index]) other->in_place = {};
+  }
+}
+
+/// From now on what the rule does is wanted, or no longer is.
+void Engine::turn(Life& life, time_ns_t now_ns) noexcept {
+  life.active = !life.active;
+  forget_found_beside(life);
+  // What others did that it was above may be there still.
+  if (!life.active && !life.in_effect && !life.under_way) life.undone = life.is_looked_up && life.rule.undoes;
+  life.turned = life.last;
+  life.failures = 0;
+  life.excused.reset();
+  life.unready_since_ns.reset();
+  life.waits_since_ns.reset();
+  life.otherwise_begun = false;
+  if (life.active && !life.under_way && !life.in_place[index_of(Act::do_)].value_or(true))
+    life.in_effect = false;
+  if (life.active || !life.in_effect || life.rule.undoes) return;
+  life.in_effect = false;  // what it did stays
+  life.cooled_ns = later_by(now_ns, life.rule.cooldown_ns);
 }
 
 time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
@@ -288,17 +325,14 @@ time_ns_t Engine::next_look(const Life& life, time_ns_t now_ns) const noexcept {
   const auto look_at = [&](time_ns_t instant_ns) {
     if (instant_ns > now_ns) next_ns = std::min(next_ns, instant_ns);
   };
-  const bool is_false = life.last.truth == Truth::no;
-  const bool may_want = is_false ? life.in_effect || life.changed_by_another
-                                 : (life.last.holds() || life.is_due) && life.may_do();
-  if (!may_want) return next_ns;
-  if (life.waits_since_ns) look_at(later_by(*life.waits_since_ns, *life.rule.otherwise_after_ns));
-  if (!life.is_due && life.due_ns() > now_ns) {
+  if (life.is_to_turn()) {
     look_at(life.due_ns());
-  } else {
-    if (life.unready_since_ns) look_at(later_by(*life.unready_since_ns, kMakingReady));
-    look_at(life.not_before_ns);
+    look_at(life.cooled_ns);
   }
+  if (!life.owed()) return next_ns;
+  if (life.waits_since_ns) look_at(later_by(*life.waits_since_ns, *life.rule.otherwise_after_ns));
+  if (life.unready_since_ns) look_at(later_by(*life.unready_since_ns, kMakingReady));
+  if (life.failures > 0) look_at(life.retry_ns);
   return next_ns;
 }
 
@@ -308,47 +342,22 @@ void Engine::consider(Life& life, Act act, time_ns_t now_ns) noexcept {
     if (act == Act::do_) want_otherwise(life, now_ns);
     return;
   }
-  if (const Life* other = act == Act::do_ ? outranking(life) : nullptr) {
-    life.waits_since_ns.reset();
-    life.is_held = true;
-    suppress(life, act, Why::outranked, now_ns, other);
-    return;
-  }
   if (life.in_place[index_of(act)].value_or(false)) {
-    suppress(life, act, Why::already, now_ns);
-    if (act == Act::do_ && !life.is_undone_by_it()) {
-      life.changed_by_another = true;
-      life.waits_since_ns.reset();
-    } else {
-      settle(life, act, now_ns);
-    }
-    return;
+    const Life* higher = outranking(life);
+    suppress(life, act, higher != nullptr ? Why::outranked : Why::already, now_ns, higher);
+    return settle(life, act, now_ns);
   }
-  const bool is_late_enough = now_ns >= life.not_before_ns;
-  if (!is_late_enough && life.failures == 0) {
-    life.is_held = true;
-    suppress(life, act, Why::cooldown, now_ns, nullptr, life.not_before_ns - now_ns);
-    return;
-  }
-  if (std::exchange(life.is_held, false)) life.free_since_ns = now_ns;
   if (act == Act::do_ && want_otherwise(life, now_ns)) return;
-  if (!is_late_enough || pending_) {  // in the next step, after what is pending
-    life.acts_soon = act == Act::do_ && life.not_before_ns <= later_by(now_ns, kMakingReady);
-    return;
-  }
-  if (const Life* other = in_the_way(life)) {
-    suppress(life, act, Why::in_flight, now_ns, other);
-    life.acts_soon = act == Act::do_;
-    return;
-  }
+  const bool is_late_enough = life.failures == 0 || now_ns >= life.retry_ns;
+  if (!is_late_enough || pending_) return;  // in the next step, after what is pending
+  if (const Life* other = in_the_way(life)) return suppress(life, act, Why::in_flight, now_ns, other);
   if (!life.ready[index_of(act)]) {
     if (!life.unready_since_ns) life.unready_since_ns = now_ns;
-    const bool is_late = now_ns >= later_by(*life.unready_since_ns, kMakingReady);
-    if (is_late) suppress(life, act, Why::not_ready, now_ns);
-    life.acts_soon = act == Act::do_ && !is_late;
+    if (now_ns >= later_by(*life.unready_since_ns, kMakingReady)) suppress(life, act, Why::not_ready, now_ns);
     return;
   }
-  pending_ = {.rule = life.index, .act = act, .cause_ns = life.last.since_ns, .measured = life.last.measured};
+  pending_ = {
+      .rule = life.index, .act = act, .cause_ns = life.turned.since_ns, .measured = life.turned.measured};
 }
 
 /// Whether it is time for the reserve action, which waits for nothing.
@@ -359,8 +368,8 @@ bool Engine::want_otherwise(Life& life, time_ns_t now_ns) noexcept {
   if (!pending_) {
     pending_ = {.rule = life.index,
                 .act = Act::otherwise,
-                .cause_ns = life.last.since_ns,
-                .measured = life.last.measured};
+                .cause_ns = life.turned.since_ns,
+                .measured = life.turned.measured};
   }
   return true;
 }
@@ -377,15 +386,11 @@ const Engine::Life* Engine::in_the_way(const Life& life) noexcept {
   return found;
 }
 
-/// A rule of higher rank that is about one of the same components, and has done or is about to do what it does. One that
-/// cannot for longer than a moment leaves the way free: something else than nothing.
+/// The highest active rule of higher rank that is about one of the same components.
 const Engine::Life* Engine::outranking(const Life& life) const noexcept {
   for (const Life* other : by_rank_) {
     if (other == &life) return nullptr;
-    if (!other->armed || !life.contends[other->index]) continue;
-    const bool begins = other->under_way == Act::do_;
-    const bool is_next = pending_ && pending_->rule == other->index && pending_->act == Act::do_;
-    if (other->in_effect || begins || is_next || other->acts_soon) return other;
+    if (other->active && life.contends[other->index]) return other;
   }
   return nullptr;
 }
@@ -395,8 +400,7 @@ void Engine::begun(time_ns_t now_ns) noexcept {
   const PendingAction action = *pending_;
   pending_.reset();
   Life& life = *lives_[action.rule];
-  life.begun = life.last;
-  life.begun_held_ns = life.free_since_ns > life.due_ns() ? life.free_since_ns - life.due_ns() : 0;
+  life.begun = life.turned;
   Decided decided = Decided::otherwise;
   if (action.act == Act::otherwise) {
     life.otherwise_begun = true;
@@ -420,10 +424,10 @@ void Engine::ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) noexc
   life.gives_way = false;
   if (how == Ended::done) {
     tell(life, {.stamp_ns = now_ns, .decided = Decided::done, .act = act});
-    settle(life, act, now_ns);
-    life.in_place[index_of(act)] = true;
-    life.in_place[index_of(opposite(act))] = false;
-    return;
+    life.undone = act == Act::undo && life.is_looked_up;
+    life.in_place = {};
+    forget_found_beside(life);
+    return settle(life, act, now_ns);
   }
   const bool is_changed = how == Ended::stale || how == Ended::withdrawn;
   const time_ns_t first_ns = is_changed ? kFirstAfterChange : std::max(life.rule.cooldown_ns, kFirstRetry);
@@ -433,7 +437,8 @@ void Engine::ended(std::size_t rule, Act act, Ended how, time_ns_t now_ns) noexc
   life.failures = std::min(life.failures + 1, kMostDoublings);
   life.failed = {act, why_of(how)};
   life.excused.reset();
-  life.not_before_ns = later_by(now_ns, wait_ns);
+  life.retry_ns = later_by(now_ns, wait_ns);
+  life.cooled_ns = later_by(now_ns, life.rule.cooldown_ns);
   tell(life,
        {.stamp_ns = now_ns, .decided = Decided::failed, .act = act, .why = why_of(how), .wait_ns = wait_ns});
 }
@@ -456,9 +461,8 @@ std::optional<Act> Engine::gives_way(std::size_t rule) const noexcept {
 }
 
 bool Engine::may_prepare(std::size_t rule) const noexcept {
-  return std::none_of(lives_.begin(), lives_.end(), [&](const auto& other) {
-    return other->contends[rule] && (other->under_way || other->acts_soon);
-  });
+  return std::none_of(lives_.begin(), lives_.end(),
+                      [&](const auto& other) { return other->contends[rule] && other->under_way; });
 }
 
 bool Engine::contend(std::size_t one, std::size_t other) const noexcept {
@@ -467,16 +471,18 @@ bool Engine::contend(std::size_t one, std::size_t other) const noexcept {
 
 /// An action is in effect, whoever did it.
 void Engine::settle(Life& life, Act act, time_ns_t now_ns) noexcept {
-  life.in_effect = act == Act::do_;
+  life.in_effect = act == Act::do_ && (life.active || life.rule.undoes);
+  life.undone = life.undone && !life.in_effect;
   life.waits_since_ns.reset();
   life.failures = 0;
-  life.excused.reset();
-  life.not_before_ns = later_by(now_ns, life.rule.cooldown_ns);
+  if (life.excused && life.excused->second != Why::outranked) life.excused.reset();
+  life.cooled_ns = later_by(now_ns, life.rule.cooldown_ns);
+  if (const Life* higher = life.in_effect ? outranking(life) : nullptr)
+    suppress(life, Act::do_, Why::outranked, now_ns, higher);
   for (const auto& other : lives_) {
     if (!life.contends[other->index]) continue;
-    other->in_place = {};
-    if (!life.in_effect || !std::exchange(other->in_effect, false)) continue;
-    suppress(*other, Act::do_, Why::outranked, now_ns, &life);  // what it did is gone
+    if (life.in_effect && other->active && other->in_effect && other->rank > life.rank)
+      suppress(*other, Act::do_, Why::outranked, now_ns, &life);
   }
 }
 
@@ -503,11 +509,13 @@ void Engine::tell(const Life& life, Decision decision) noexcept {
   }
   decision.rule = static_cast<std::int32_t>(life.index);
   const bool is_outcome = decision.decided == Decided::done || decision.decided == Decided::failed;
-  const Look& look = is_outcome ? life.begun : life.last;
+  const bool is_begin = decision.decided == Decided::do_ || decision.decided == Decided::undo ||
+                        decision.decided == Decided::otherwise;
+  const Look& look = is_outcome || is_begin ? life.begun : life.last;
   decision.cause_ns = look.since_ns;
   decision.sample_ns = look.cause_ns();
   decision.measured = look.measured;
-  if (is_outcome) decision.held_ns = life.begun_held_ns;
+  if (is_outcome) decision.held_ns = life.held_ns;
   ring_[told % kRing] = decision;
   told_.store(told + 1, std::memory_order_release);
 }
@@ -524,8 +532,9 @@ RuleStatus Engine::status(std::size_t rule) const noexcept {
   const Life& life = *lives_[rule];
   RuleStatus status{.armed = life.armed,
                     .truth = life.last.truth,
+                    .active = life.active,
                     .in_effect = life.in_effect,
-                    .changed_by_another = life.changed_by_another,
+                    .is_at_work = life.active || life.in_effect || life.undone || life.under_way.has_value(),
                     .since_ns = life.last.since_ns,
                     .measured = life.last.measured};
   if (life.failures > 0) {
@@ -533,18 +542,20 @@ RuleStatus Engine::status(std::size_t rule) const noexcept {
     status.why = life.failed.second;
   }
   if (!life.armed) return status;
-  if ((life.last.holds() || life.is_due) && !life.in_effect && !life.changed_by_another) {
-    status.next = Act::do_;
-    status.next_ns = std::max(life.is_due ? INT64_MIN : life.due_ns(), life.not_before_ns);
-  } else if (life.last.truth == Truth::no && life.in_effect && life.rule.undoes) {
-    status.next = Act::undo;
-    status.next_ns = std::max(life.due_ns(), life.not_before_ns);
-  } else if (!life.last.holds() && !life.in_effect && life.last.next_ns != kForever) {
+  if (const auto act = life.owed()) {
+    status.next = act;
+    status.next_ns = life.failures > 0 ? life.retry_ns : INT64_MIN;
+  } else if (life.is_to_turn() && (!life.active || life.rule.undoes)) {
+    status.next = life.active ? Act::undo : Act::do_;
+    status.next_ns = std::max(life.due_ns(), life.cooled_ns);
+  } else if (!life.active && life.last.next_ns != kForever) {
     status.next = Act::do_;  // if nothing is told until then
-    status.next_ns = std::max(later_by(life.last.next_ns, life.rule.for_ns), life.not_before_ns);
+    status.next_ns = std::max(later_by(life.last.next_ns, life.rule.for_ns), life.cooled_ns);
   }
   return status;
 }
+
+bool Engine::is_active(std::size_t rule) const noexcept { return lives_[rule]->active; }
 
 const Rule& Engine::rule(std::size_t rule) const noexcept { return lives_[rule]->rule; }
 

@@ -19,16 +19,52 @@ constexpr time_ns_t kPreparing = s_to_ns(1);  // a preparation that lasts longer
 constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 
 // What the follower found of a rule.
-constexpr std::uint64_t kPresent = 1;   // all that it is about is there and runs
-constexpr std::uint64_t kKnown = 2;     // from here on one for each act: whether it is known ...
-constexpr std::uint64_t kInPlace = 8;   // ... that what it asks for is so
-constexpr std::uint64_t kByRules = 32;  // what its `do` asks for is so by rules
-constexpr unsigned kEndsAt = 6;
+constexpr std::uint64_t kPresent = 1;  // all that it is about is there and runs
+constexpr std::uint64_t kKnown = 2;    // from here on one for each act: whether it is known ...
+constexpr std::uint64_t kInPlace = 8;  // ... that nothing is left to be done by it
+constexpr unsigned kEndsAt = 5;
 
 constexpr std::array kPrepared{Act::do_, Act::undo};
 
 /// So many decisions may wait for who reports them. Outcomes of actions come on top: each is reported.
 constexpr std::size_t kMostTold = 1000;
+
+/// What a rule wants while it is active, and leaves at its end.
+OverlaySpec overlay_of(const mauve::rules::Rule& rule, const RuleActions& actions) {
+  return {.rule = rule.name,
+          .source = {},
+          .priority = rule.priority,
+          .safety = rule.safety,
+          .whole = actions.whole,
+          .assigns = assigned(actions.do_steps),
+          .leaves = assigned(rule.undoes ? actions.undo_steps : actions.do_steps),
+          .leaves_over_persons = !rule.undoes || actions.takes_over};
+}
+
+ActionSteps steps_of(const std::vector<Assigned>& all) {
+  ActionSteps steps;
+  for (const Assigned& one : all) steps.push_back(one.step);
+  return steps;
+}
+
+/// Of rules that are at work and not among these: they end at once.
+void add_released(const Overlays& overlays, std::vector<mauve::rules::Rule>& rules,
+                  std::vector<RuleActions>& actions) {
+  for (const auto& overlay : overlays.at_work({})) {
+    const OverlaySpec& spec = overlay->spec();
+    if (std::any_of(rules.begin(), rules.end(), [&](const auto& rule) { return rule.name == spec.rule; }))
+      continue;
+    mauve::rules::Rule rule{.name = spec.rule, .undoes = true, .priority = spec.priority};
+    rule.safety = spec.safety;
+    rule.is_released = true;
+    for (const Assigned& one : spec.assigns) rule.about.push_back(one.step.target);
+    rules.push_back(std::move(rule));
+    actions.push_back({.do_steps = steps_of(spec.assigns),
+                       .undo_steps = steps_of(spec.leaves),
+                       .takes_over = spec.leaves_over_persons,
+                       .whole = spec.whole});
+  }
+}
 
 bool is_outcome(const Decision& decision) noexcept {
   return decision.decided == Decided::done || decision.decided == Decided::failed;
@@ -36,26 +72,23 @@ bool is_outcome(const Decision& decision) noexcept {
 
 }  // namespace
 
-RuleRunner::RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules,
-                       const std::vector<RuleActions>& actions, std::map<std::string, std::string> topics,
-                       RuleRunner* before)
+RuleRunner::RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, std::vector<RuleActions> actions,
+                       std::map<std::string, std::string> topics, RuleRunner* before)
     : host_(host),
       clock_(host.clock()),
-      engine_(
-          std::make_unique<Engine>(std::move(rules), before != nullptr ? before->engine_.get() : nullptr)),
       feeds_(before != nullptr ? before->feeds_
                                : std::make_shared<Feeds>(
                                      FeedPlace{.architecture = host.architecture(), .clock = host.clock()})),
       trace_number_(host.architecture().trace_number("(rules)")) {
   MAUVE_EXPECTS(before == nullptr || (!before->runs_ && &before->host_ == &host));
-  if (actions.size() != engine_->size())
+  if (actions.size() != rules.size())
     throw Error(ErrorCode::invalid_argument, "every rule of the engine has its actions, and only these");
+  add_released(overlays(), rules, actions);
+  engine_ = std::make_unique<Engine>(std::move(rules), before != nullptr ? before->engine_.get() : nullptr);
   for (const RuleActions& each : actions) {
-    make_transaction(each.do_steps);  // its kinds are checked here
-    make_transaction(each.undo_steps);
     const mauve::rules::Rule& rule = engine_->rule(rules_.size());
-    rules_.push_back(std::make_unique<Rule>(
-        each, rule.name, rule.otherwise_after_ns ? rule.about : std::vector<std::string>()));
+    overlay_of(rule, each);  // the kinds of its steps are checked here
+    rules_.push_back(std::make_unique<Rule>(each, rule));
     rules_.back()->applied = UINT64_MAX;
     rules_.back()->name = TraceNames::intern(rule.name);
   }
@@ -91,17 +124,39 @@ void RuleRunner::go_on_from(RuleRunner& before, const std::vector<std::optional<
 std::optional<std::size_t> RuleRunner::find(const RuleRunner& other, std::size_t rule) const {
   const std::optional<std::size_t> found = engine_->find(other.engine_->rule(rule));
   if (!found) return std::nullopt;
-  for (const Act act : kPrepared) {
-    if (rules_[*found]->action(act).steps() != other.rules_[rule]->action(act).steps()) return std::nullopt;
-  }
-  return found;
+  const RuleActions& own = rules_[*found]->actions;
+  const RuleActions& theirs = other.rules_[rule]->actions;
+  const bool is_same = own.do_steps == theirs.do_steps && own.undo_steps == theirs.undo_steps;
+  return is_same ? found : std::nullopt;
 }
 
 RuleRunner::~RuleRunner() { stop(); }
 
+/// What was at work before goes on.
+void RuleRunner::load_overlays() {
+  std::vector<OverlaySpec> specs;
+  for (std::size_t i = 0; i < rules_.size(); ++i)
+    specs.push_back(overlay_of(engine_->rule(i), rules_[i]->actions));
+  const auto loaded = overlays().load({}, std::move(specs));
+  const time_ns_t now_ns = clock_.now_ns();
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Rule& rule = *rules_[i];
+    rule.overlay = loaded[i];
+    rule.shares.clear();
+    for (std::size_t j = 0; j < rules_.size(); ++j) {
+      if (j != i && loaded[i]->shares_with(*loaded[j])) rule.shares.push_back(j);
+    }
+    if ((loaded[i]->is_active() || loaded[i]->is_engaged()) && !engine_->status(i).is_at_work)
+      engine_->adopt(i, loaded[i]->is_active(), now_ns);
+    rule.in_effect.store(engine_->status(i).in_effect, std::memory_order_relaxed);
+  }
+}
+
 void RuleRunner::start() {
+  if (runs_) return;
   epoch_ns_ = host_.epoch_ns();
-  if (runs_ || host_.is_simulated()) return;
+  load_overlays();
+  if (host_.is_simulated()) return;
   ending_.store(0, std::memory_order_relaxed);  // the threads' creation publishes it
   host_.architecture().changes().set_listener(&work_);
   look_around();
@@ -183,10 +238,13 @@ void RuleRunner::stop() noexcept {
     for (Action& action : rules_[i]->acts) action.settle(host_);
     report(i);
   }
+  show_activity();
   tell();
 }
 
 time_ns_t RuleRunner::advance() {
+  if (std::any_of(rules_.begin(), rules_.end(), [](const auto& rule) { return rule->overlay == nullptr; }))
+    load_overlays();
   beat();
   for (;;) {
     look_around();
@@ -220,14 +278,17 @@ time_ns_t RuleRunner::step() noexcept {
   const time_ns_t now_ns = clock_.now_ns();
   hear_ends(now_ns);
   if (!host_.is_deployed()) return kForever;  // its components stop: what is heard of that is no cause to act
+  reset_asked(now_ns);
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     apply_found(i, now_ns);
-    for (const Act act : kPrepared) engine_->set_ready(i, act, rules_[i]->action(act).is_ready());
+    for (const Act act : kPrepared) engine_->set_ready(i, act, is_ready(i, act));
   }
   time_ns_t next_ns = engine_->step(now_ns);
+  show_activity();
   while (const std::optional<PendingAction> pending = engine_->pending()) {
     begin(*pending, now_ns);
     next_ns = engine_->step(now_ns);
+    show_activity();
   }
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     if (const std::optional<Act> act = engine_->gives_way(i)) rules_[i]->action(*act).call_off();
@@ -235,6 +296,40 @@ time_ns_t RuleRunner::step() noexcept {
   show_status();
   work_.bump();
   return next_ns;
+}
+
+bool RuleRunner::is_ready(std::size_t index, Act act) const noexcept {
+  Rule& rule = *rules_[index];
+  return rule.action(act).is_ready(rule.overlay->outdated(act == Act::do_));
+}
+
+/// Before anything is begun: who makes a change, or follows one, sees by this what is wanted.
+void RuleRunner::show_activity() noexcept {
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Rule& rule = *rules_[i];
+    const RuleStatus status = engine_->status(i);
+    const bool is_other = rule.overlay->is_active() != status.active;
+    rule.overlay->set_engaged(status.is_at_work || rule.is_unsettled());
+    rule.overlay->set_active(status.active);
+    if (!is_other) continue;
+    rule.ends.fetch_add(1, std::memory_order_release);  // what was found before is of yesterday
+    for (const std::size_t other : rule.shares) {
+      Overlay& overlay = *rules_[other]->overlay;
+      rules_[other]->ends.fetch_add(1, std::memory_order_release);
+      if (rule.overlay->ranks_above(overlay)) overlay.outdate(true);
+      overlay.outdate(false);
+      rules_[other]->prepares.ask();
+    }
+  }
+}
+
+void RuleRunner::reset_asked(time_ns_t now_ns) noexcept {
+  for (std::size_t i = 0; i < rules_.size(); ++i) {
+    Atomic<std::uint32_t>& word = rules_[i]->reset;
+    if (word.load(std::memory_order_acquire) != kResetAsked) continue;
+    word.store(engine_->reset(i, now_ns) ? kIsReset : kResetRefused, std::memory_order_release);
+    futex_wake_all(word);
+  }
 }
 
 /// Posts it; its end wakes the engine.
@@ -245,7 +340,8 @@ void RuleRunner::begin(const PendingAction& pending, time_ns_t now_ns) noexcept 
     engine_->begun(now_ns);
     rule.reserve.begin();
     rule.reserves.ask();
-  } else if (Action& action = rule.action(pending.act); action.begin()) {
+  } else if (Action& action = rule.action(pending.act);
+             is_ready(pending.rule, pending.act) && action.begin()) {
     engine_->begun(now_ns);
     (action.is_preparable() ? rule.commits : rule.prepares).ask();
   } else {
@@ -285,12 +381,8 @@ void RuleRunner::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
     const bool is_so = (found & (kInPlace << index_of(act))) != 0;
     return is_known ? std::optional(is_so) : std::nullopt;
   };
-  engine_->set_own(index, (found & kByRules) != 0);
-  const bool is_first = !std::exchange(rule.was_present, true);
-  if (is_first && engine_->rule(index).undoes && in_place(Act::do_) == true && in_place(Act::undo) == false)
-    engine_->adopt(index, now_ns);
   for (const Act act : kPrepared) {
-    if (const std::optional<bool> is_so = in_place(act)) engine_->set_in_place(index, act, *is_so, now_ns);
+    if (const std::optional<bool> is_so = in_place(act)) engine_->set_in_place(index, act, *is_so);
   }
 }
 
@@ -299,9 +391,7 @@ void RuleRunner::apply_found(std::size_t index, time_ns_t now_ns) noexcept {
 bool RuleRunner::is_unsettled(std::size_t index) const noexcept {
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     if (i != index && !engine_->contend(i, index)) continue;
-    for (const Action& action : rules_[i]->acts) {
-      if (action.is_unsettled()) return true;
-    }
+    if (rules_[i]->is_unsettled()) return true;
   }
   return false;
 }
@@ -336,7 +426,7 @@ bool RuleRunner::commit(std::size_t index) noexcept {
 bool RuleRunner::reserve(std::size_t index) noexcept {
   Rule& rule = *rules_[index];
   if (!rule.reserve.is_begun()) return false;
-  deliver(rule, Act::otherwise, {.failure = rule.reserve.carry_out(host_)});
+  deliver(rule, Act::otherwise, {.steps = {}, .report = {}, .failure = rule.reserve.carry_out(host_)});
   rule.reserve.end();
   engine_->wake();
   return true;
@@ -362,21 +452,33 @@ bool RuleRunner::prepare(std::size_t index) {
   return changed || is_other;
 }
 
-/// What is in effect can be undone, what is not can be done; would it be possible to undo that? To find out is a
-/// preparation, and keeps requests for the components waiting: so that is tried only where somebody else has changed them, or the
-/// structure.
+/// What is in effect can be undone, what is not can be done; would it be possible to undo that? That is tried only where somebody
+/// else has changed the components, or the structure.
 bool RuleRunner::make_ready(Rule& rule, bool after_own) {
   if (!rule.may_prepare.load(std::memory_order_relaxed)) return false;
   const std::uint64_t revision = host_.architecture().revision();
   const bool in_effect = rule.in_effect.load(std::memory_order_relaxed);
-  Action& next = rule.action(in_effect ? Act::undo : Act::do_);
   Action& other = rule.action(in_effect ? Act::do_ : Act::undo);
   const bool was_ready = other.put_away();
-  const bool is_anew = next.exists() && next.prepare(host_, revision);
+  const bool is_anew = make_ready(rule, in_effect ? Act::undo : Act::do_, revision);
   const std::uint32_t structure = host_.architecture().commit_gate().structure();
   const bool is_restructured = std::exchange(rule.structure, structure) != structure;
-  if (other.exists() && ((is_anew && !after_own) || is_restructured)) other.try_after(next.steps(), host_);
+  if (other.exists() && ((is_anew && !after_own) || is_restructured)) {
+    const ArchitectureDescription description = host_.describe();
+    other.try_after(overlays().steps_if(*rule.overlay, !in_effect, &description),
+                    overlays().steps_if(*rule.overlay, in_effect, nullptr), host_);
+  }
   return was_ready || is_anew;
+}
+
+bool RuleRunner::make_ready(Rule& rule, Act act, std::uint64_t revision) {
+  Action& action = rule.action(act);
+  const bool is_active = act == Act::do_;
+  const std::uint32_t based_on = rule.overlay->outdated(is_active);  // before the steps are found
+  if (!action.exists() || !action.is_wanting(revision, based_on)) return false;
+  const ArchitectureDescription description = host_.describe();
+  return action.prepare(host_, revision, overlays().steps_if(*rule.overlay, is_active, &description),
+                        based_on);
 }
 
 /// For facts().
@@ -386,6 +488,7 @@ void RuleRunner::keep(Rule& rule) {
     if (kept.problem.empty()) kept.problem = action.problem();
     kept.memory_bytes += action.memory_bytes();
   }
+  for (const Act act : kPrepared) kept.has_no_steps[index_of(act)] = rule.action(act).has_no_steps();
   const LockGuard lock(told_mutex_);
   if (rule.kept == kept) return;
   rule.kept = std::move(kept);
@@ -438,23 +541,25 @@ bool RuleRunner::look_around() {
     if (!is_unsettled(i)) ends[i] = found_after;
   }
   const std::uint64_t revision = host_.architecture().revision();
+  overlays().settle_ended();
+  const Overlays::Look look = overlays().look();
   const ArchitectureDescription description = host_.describe();
-  const std::vector<Authored> authors = host_.architecture().authors();
+  host_.architecture().follow(look, description);
   bool changed = false;
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     if (!ends[i]) continue;
     Rule& rule = *rules_[i];
     std::uint64_t found = (*ends[i] + 1) << kEndsAt;  // 0: never looked
-    if (hinder(rule, hindrance(rule.action(Act::do_).steps(), description))) found |= kPresent;
+    if (hinder(rule, hindrance(rule.actions.do_steps, description))) found |= kPresent;
     for (const Act act : kPrepared) {
-      const std::optional<bool> is_so = is_in_place(rule.action(act).steps(), description);
+      const std::optional<bool> is_so = overlays().is_so(*rule.overlay, act == Act::do_, description);
       if (is_so) found |= kKnown << index_of(act);
       if (is_so == true) found |= kInPlace << index_of(act);
     }
-    if (is_by_rules(rule.action(Act::do_).steps(), authors)) found |= kByRules;
     changed = rule.found.exchange(found, std::memory_order_acq_rel) != found || changed;
   }
-  if (std::exchange(followed_, revision) != revision) {
+  const std::uint64_t outdated = revision + overlays().changes();
+  if (std::exchange(followed_, outdated) != outdated) {
     for (const auto& rule : rules_) rule->prepares.ask();
   }
   return changed;
@@ -536,6 +641,30 @@ void RuleRunner::tell() {
 
 // ---- anyone
 
+std::string RuleRunner::reset(const std::string& rule) {
+  constexpr time_ns_t kPatience = s_to_ns(2);
+  std::size_t index = 0;
+  while (index < rules_.size() && engine_->rule(index).name != rule) ++index;
+  if (index == rules_.size()) return "there is no rule " + rule;
+  if (!engine_->rule(index).latch) return "rule " + rule + " is not latched: it ends by itself";
+  Atomic<std::uint32_t>& word = rules_[index]->reset;
+  word.store(kResetAsked, std::memory_order_release);
+  engine_->wake();
+  if (host_.is_simulated()) {
+    reset_asked(clock_.now_ns());
+  } else {
+    const time_ns_t until_ns = later_by(monotonic_now_ns(), kPatience);
+    while (word.load(std::memory_order_acquire) == kResetAsked) {
+      if (!futex_wait_until(word, kResetAsked, until_ns)) break;
+    }
+  }
+  const std::uint32_t answer = word.exchange(kNoReset, std::memory_order_acq_rel);
+  if (answer == kIsReset) return {};
+  if (answer == kResetAsked) return "the rules are not at work";
+  return "rule " + rule +
+         " is not active, or its condition is not known to be false: the cause must be gone first";
+}
+
 std::vector<Told> RuleRunner::wait_told(time_ns_t timeout_ns) {
   const LockGuard lock(told_mutex_);
   const time_ns_t until_ns = later_by(monotonic_now_ns(), timeout_ns);
@@ -577,9 +706,10 @@ std::vector<RuleFacts> RuleRunner::facts() const {
   const LockGuard status(status_mutex_);
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     Rule& rule = *rules_[i];
+    const Act next = rule.status.in_effect ? Act::undo : Act::do_;
     all.push_back({.name = engine_->rule(i).name,
                    .status = rule.status,
-                   .ready = rule.action(rule.status.in_effect ? Act::undo : Act::do_).is_ready(),
+                   .ready = rule.kept.has_no_steps[index_of(next)] || (rule.overlay && is_ready(i, next)),
                    .problem = problem_of(rule),
                    .memory_bytes = rule.kept.memory_bytes});
   }

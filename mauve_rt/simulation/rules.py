@@ -48,6 +48,7 @@ class SimulatedRules:
         )
         specs = rule_specs(rules, with_reserve=True)
         self._runner = RuleRunner(runtime.host, specs, rule_actions(file, runtime), topics)
+        self._runner.start()
         self._due_ns = 0
         self.look()
 

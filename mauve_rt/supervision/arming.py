@@ -1,9 +1,7 @@
 """What a supervisor asks the executor about a rule before it needs it, without ROS and with injected time.
 
-Once for each start of the executor, when a rule is armed for the first time: is what it does in effect (a
-supervisor before this one did it, or the executor itself: the rule takes it as its own, to undo it), and
-would the executor take what it does and undoes (dry runs)? What would be refused is told then, not when the
-link is lost.
+Once for each start of the executor, when a rule is armed for the first time: would the executor take what it
+does and undoes (dry runs)? What would be refused is told then, not when the link is lost.
 """
 
 from collections import deque
@@ -40,7 +38,6 @@ class Arming:
         look: Callable[[], None],
         act: Callable[[Request], None],
         ids: Iterator[str],
-        adopt: Callable[[WatchedRule, int], None],
         tell: Tell,
         status: Callable[[int], RuleStatus],
     ) -> None:
@@ -48,7 +45,6 @@ class Arming:
         self._look = look
         self._act = act
         self._ids = ids
-        self._adopt = adopt
         self._tell = tell
         self._status = status
         self.forget()
@@ -90,22 +86,25 @@ class Arming:
             self._next(trial)
             return
         request = Request(
-            request_id=next(self._ids), steps=tuple(self._steps(trial)), cause=_cause(trial), dry_run=True
+            request_id=next(self._ids),
+            steps=tuple(self._steps(trial)),
+            cause=_cause(trial),
+            rule=trial.each.rule.name,
+            dry_run=True,
         )
         self._flight = (request.request_id, trial)
         self._try_again_ns = now_ns + ANSWER_TIMEOUT_NS
         self._act(request)
 
     def on_inventory(self, now_ns: int, inventory: Inventory) -> None:
-        """Take rules whose do is in effect as done by this supervisor, and line up what is to be tried."""
+        """Line up what is to be tried: not what is so."""
+        del now_ns
         unlisted, self._unlisted = self._unlisted, []
         for each in unlisted:
             undo = each.rule.steps("undo")
             if not inventory.shows(each.rule.do):
                 self._trials.append(_Trial(each, "do"))
             elif undo and not inventory.shows(undo):
-                if each.untouched:
-                    self._adopt(each, now_ns)
                 self._trials.append(_Trial(each, "undo"))
 
     def on_outcome(self, now_ns: int, request_id: str, outcome: Outcome | None) -> bool:
@@ -138,7 +137,7 @@ class Arming:
 
     def _next(self, trial: _Trial) -> None:
         self._trials.remove(trial)
-        if trial.act == "do" and trial.each.rule.undo is not None:
+        if trial.act == "do" and trial.each.rule.steps("undo"):
             self._trials.appendleft(_Trial(trial.each, "undo"))
 
     def _in_effect(self, trial: _Trial) -> bool:

@@ -41,7 +41,7 @@ _WORDS: Mapping[str, Words] = {
 _HOLDS = {"condition_true": True, "condition_false": False, "condition_unknown": None}
 _FIXED = {
     "armed": "watching",
-    "adopted": "what it does is in effect already: undone when it is time",
+    "adopted": "it is active since before: undone when it is time",
 }
 
 
@@ -70,7 +70,7 @@ def reason_of(decision: RuleDecision, rules: Sequence[Rule], *, name: Name = str
         case "otherwise":
             return f"do is not in effect {rule.otherwise_after_s:g} s after it was due: {what}"
         case "done":
-            return f"{act}: {what}"
+            return f"{act}: {what or 'what was there before'}"
         case _:
             return _not_done(decision, rules, failure)
 

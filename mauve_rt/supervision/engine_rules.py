@@ -26,5 +26,6 @@ def _rule_spec(rule: Rule, *, with_reserve: bool) -> RuleSpec:
         priority=rule.priority,
         about=sorted(touched(rule.do) | touched(undo.do if undo is not None else ())),
         otherwise_after_ns=nanoseconds(rule.otherwise_after_s) if has_reserve else None,
-        takes_over=rule.takes_over,
+        safety=rule.safety,
+        latch=rule.latch,
     )

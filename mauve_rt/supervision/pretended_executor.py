@@ -3,7 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+from mauve_rt._kernel import Overlays, OverlaySpec
 from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.control.wishes import are_equal, assignment_of, step_of
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
@@ -21,6 +23,7 @@ class PretendedExecutor:
 
     def __post_init__(self) -> None:
         self._components: dict[str, ListedComponent] = {}
+        self._overlays = Overlays()
         self._resources: set[str] = set()
         self._revision = 1
         for rule in self.rules:
@@ -32,10 +35,19 @@ class PretendedExecutor:
             for step in rule.undo.do if rule.undo is not None else []:
                 self._take(step)
 
+    def follows(self, rule: str) -> bool:
+        """Whether anything is as an active rule wants it: no rule of higher rank holds all of it."""
+        found = self._overlays.find(rule)
+        if found is None or not found.is_active:
+            return False
+        wanted = (self._overlays.wanted(step) for step in found.assigns)
+        return any(each.by == "rule" and each.rule == rule for each in wanted)
+
     def view(self) -> ArchitectureView:
         """As ~/state."""
         shown = {name: ComponentView(each.state, each.core) for name, each in self._components.items()}
-        return ArchitectureView(INSTANCE, self._revision, shown)
+        active = frozenset(overlay.rule for overlay in self._overlays.active())
+        return ArchitectureView(INSTANCE, self._revision, shown, active=active)
 
     def inventory(self) -> Inventory:
         """As ~/list_components."""
@@ -44,10 +56,29 @@ class PretendedExecutor:
     def handle(self, request: Request) -> Outcome:
         """Take it; a dry run changes nothing."""
         if not request.dry_run:
-            for step in request.steps:
+            for step in self._wanted(request) if request.rule else request.steps:
                 self._take(step)
             self._revision += 1
         return Outcome(code=Code.OK, message="", revision=self._revision)
+
+    def _wanted(self, request: Request) -> list[Step]:
+        """What a rule's request comes to, besides other rules."""
+        stated = [assignment_of(step) for step in request.steps]
+        found = self._overlays.find(request.rule)
+        assigns = found.assigns if request.release and found is not None else stated
+        leaves = stated if request.release else []
+        spec = OverlaySpec(
+            request.rule,
+            assigns,
+            leaves=leaves,
+            priority=request.priority,
+            leaves_over_persons=are_equal(leaves, assigns),
+        )
+        overlay = self._overlays.put("", spec)
+        steps = self._overlays.steps_if(overlay, is_active=not request.release)
+        self._overlays.set_active(overlay, is_active=not request.release)
+        self._overlays.settle_ended()
+        return [step_of(step, request.steps) for step in steps]
 
     def _be_there(self, step: Step) -> None:
         """What a step needs before it can be done."""

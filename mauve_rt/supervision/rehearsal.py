@@ -101,7 +101,7 @@ def try_rule(file: RulesFile, index: int, model: ArchitectureModel) -> None:
             executor.carry_out(rule.do, dry_run=True)
         except RefusedStepError as error:
             raise file.error(("rules", index, "do", error.index), str(error)) from None
-        if rule.undo is None:
+        if rule.undo is None or not rule.undo.do:
             return
         try:
             executor.carry_out(rule.do)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 
 from mauve_rt._kernel import PendingAction, RuleEngine, RuleStatus
 from mauve_rt.control.requests import Code, Outcome, Request
-from mauve_rt.supervision.arming import Arming
+from mauve_rt.supervision.arming import ASK_AGAIN_NS, NEVER_NS, Arming
 from mauve_rt.supervision.decision_words import Name
 from mauve_rt.supervision.decisions import Decision, decision_of
 from mauve_rt.supervision.engine_rules import rule_specs
@@ -23,7 +23,6 @@ from mauve_rt.supervision.rule import ArchitectureView, WatchedRule
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import ViewSignals
 
-ACTS = ("do", "undo")
 LEFT_TO_EXECUTOR = "the executor runs it itself: left to it while it does"
 
 
@@ -73,9 +72,7 @@ class RemoteRules:
         self._failure = self._message = ""  # of the flight that has just ended
         self._due_ns: int | None = None
         self._word = self._engine.word()
-        self._arming = Arming(
-            look=look, act=act, ids=ids, adopt=self._adopt, tell=self._say, status=self.status
-        )
+        self._arming = Arming(look=look, act=act, ids=ids, tell=self._say, status=self.status)
 
     def hear(self, signal: int, now_ns: int, value: float = 0.0) -> None:
         """Something that a condition listens to: one of `signals`."""
@@ -97,6 +94,7 @@ class RemoteRules:
         if pending is not None:
             self._let_wait(pending, now_ns)
         self._tell()
+        next_ns = min(next_ns, self._let_go(now_ns))
         self._arming.tick(now_ns)
         if self._flight is not None:
             next_ns = min(next_ns, self._flight.deadline_ns)
@@ -126,6 +124,9 @@ class RemoteRules:
         """
         if self._arming.on_outcome(now_ns, request_id, outcome):
             return
+        for each in self._watched:
+            if each.releasing == request_id and (outcome is None or not outcome.success):
+                each.release_ns = now_ns + ASK_AGAIN_NS
         flight = self._flight
         if flight is None or flight.request.request_id != request_id or flight.outcome is not None:
             return
@@ -159,6 +160,9 @@ class RemoteRules:
         self._tell()
 
     def _follow_one(self, each: WatchedRule, view: ArchitectureView, now_ns: int) -> None:
+        is_active = each.rule.name in view.active
+        if not is_active:
+            each.own, each.releasing, each.release_ns = False, "", 0
         if each.rule.where == "executor" and each.rule.name in view.rules:
             if not each.left:
                 self._engine.forget(each.number)
@@ -178,39 +182,63 @@ class RemoteRules:
             self._tell()
             return
         was_armed = self.status(each.number).armed
-        self._engine.set_own(each.number, view.is_by_rules(each.rule.do))
         running = ", ".join(f"{name} is RUNNING" for name in sorted(each.rule.targets()))
         each.standing = running or "the executor is there"
         self._engine.set_present(each.number, True, now_ns)
         self._tell()
         if not was_armed:
             self._arming.begin(each, now_ns)
-        for act in ACTS:
-            is_so = view.shows(each.rule.steps(act))
-            if is_so is not None:
-                self._engine.set_in_place(each.number, act, is_so, now_ns)
-
-    def _adopt(self, each: WatchedRule, now_ns: int) -> None:
-        """What it does was done before it was armed."""
-        self._engine.adopt(each.number, now_ns)
-        self._tell()
+        if is_active and not each.own and not self.status(each.number).in_effect:
+            each.own = True  # of a supervisor before this one
+            self._engine.adopt(each.number, is_active=True, now_ns=now_ns)
+            self._tell()
+        self._engine.set_in_place(each.number, "do", is_active and not each.releasing)
 
     # ---- acting
 
     def _send(self, pending: PendingAction, now_ns: int) -> None:
         each = self._watched[pending.rule]
         self._engine.begun(now_ns)
+        each.releasing = ""
+        stays = pending.act == "undo" and each.rule.undo is None  # it ended before its `do` was done
         cause = f"{each.rule.name}: {self._tell()}"
         request = Request(
             request_id=next(self._ids),
-            steps=tuple(each.rule.steps(pending.act)),
+            steps=tuple(each.rule.do if stays else each.rule.steps(pending.act)),
             expected_revision=self._revision(),
             cause=cause,
             rule=each.rule.name,
+            release=pending.act == "undo",
+            priority=each.rule.priority,
         )
-        each.untouched = False
         self._flight = _Flight(each, pending.act, request, now_ns + ANSWER_TIMEOUT_NS)
         self._act(request)
+
+    def _let_go(self, now_ns: int) -> int:
+        """End at the executor what has ended here, until ~/state shows it; when to ask again at the latest.
+
+        What a rule without `undo` did stays.
+        """
+        next_ns = NEVER_NS
+        for each in self._watched:
+            status = self.status(each.number)
+            if self._flight is not None or not each.own or status.active or status.in_effect:
+                continue
+            if now_ns >= each.release_ns:
+                each.releasing = next(self._ids)
+                each.release_ns = now_ns + ANSWER_TIMEOUT_NS
+                self._act(
+                    Request(
+                        request_id=each.releasing,
+                        steps=tuple(each.rule.do),
+                        cause=f"{each.rule.name}: its condition has ended",
+                        rule=each.rule.name,
+                        release=True,
+                    )
+                )
+            if each.own:
+                next_ns = min(next_ns, each.release_ns)
+        return next_ns
 
     def _let_wait(self, pending: PendingAction, now_ns: int) -> None:
         flight = self._flight
@@ -239,12 +267,13 @@ class RemoteRules:
         if not flight.outcome.success:
             self._fail("refused", now_ns, how="stale", message=flight.outcome.message)
             return
-        steps = flight.each.rule.steps(flight.act)
         # At a later revision somebody else may have changed it again: that is no failure of ours.
-        if view.revision == flight.outcome.revision and view.shows(steps) is False:
-            reason = f"~/state shows otherwise: {view.describe(steps)}"
-            self._fail(reason, now_ns, message=flight.outcome.message)
+        is_active = flight.each.rule.name in view.active
+        if view.revision == flight.outcome.revision and is_active != (flight.act == "do"):
+            is_so = "active" if is_active else "not active"
+            self._fail(f"~/state shows that it is {is_so}", now_ns, message=flight.outcome.message)
             return
+        flight.each.own = is_active and flight.act == "do"
         self._end(now_ns, "done", message=flight.outcome.message)
 
     def _fail(self, reason: str, now_ns: int, *, how: str = "refused", message: str = "") -> None:

@@ -5,11 +5,12 @@ something was in effect already when a rule was armed is taken from the bag.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import groupby
+from itertools import chain, groupby
 from operator import methodcaller
 from typing import NamedTuple
 
-from mauve_rt._kernel import RuleEngine, SignalSpec
+from mauve_rt._kernel import ActionStep, Overlays, OverlaySpec, RuleEngine, SignalSpec
+from mauve_rt.control.wishes import assignment_of
 from mauve_rt.supervision.engine_rules import rule_specs
 from mauve_rt.supervision.explanation import StoryEntry
 from mauve_rt.supervision.recorded_signals import RecordedSignals
@@ -100,22 +101,88 @@ def comparison_lines(found: Sequence[Compared], begin_ns: int) -> Iterator[str]:
         yield "  ".join(words + times) + mark
 
 
+class _Replayed:
+    """An engine and what its rules want of each element, without an executor: all is done at once."""
+
+    def __init__(self, rules: Sequence[Rule]) -> None:
+        self.engine = RuleEngine(rule_specs(rules))
+        self._rules = rules
+        self._overlays = Overlays()
+        assigns = [[assignment_of(step) for step in rule.do] for rule in rules]
+        self._each = self._overlays.load(
+            "",
+            [
+                OverlaySpec(rule.name, steps, priority=rule.priority, safety=rule.safety, whole=rule.whole)
+                for rule, steps in zip(rules, assigns, strict=True)
+            ],
+        )
+        for step in chain.from_iterable(assigns):
+            self._overlays.set_base(_before(step), "")
+        self.found: list[Acted] = []
+
+    def until(self, next_ns: int, time_ns: int) -> int:
+        """Step as often as the engine asks for before an instant; returns when it asks for the next one."""
+        while next_ns < time_ns:
+            next_ns = max(self.step(next_ns), next_ns + 1)
+        return next_ns
+
+    def step(self, now_ns: int) -> int:
+        """Decide at an instant until nothing more is wanted."""
+        while True:
+            self._follow()
+            next_ns = self.engine.step(now_ns)
+            self._follow()
+            pending = self.engine.pending
+            if pending is not None:
+                self.found.append(Acted(now_ns, self._rules[pending.rule].name, pending.act))
+                self.engine.begun(now_ns)
+                self.engine.ended(pending.rule, pending.act, "done", now_ns)
+            while self.engine.take() is not None:
+                pass  # what it tells of them is of no interest
+            if pending is None:
+                return next_ns
+
+    def _follow(self) -> None:
+        """A rule has nothing to do where others hold all that it wants."""
+        for number, overlay in enumerate(self._each):
+            self._overlays.set_active(overlay, is_active=self.engine.status(number).active)
+        self._overlays.settle_ended()
+        for number, overlay in enumerate(self._each):
+            for act, is_active in (("do", True), ("undo", False)):
+                left = self._overlays.steps_if(overlay, is_active)
+                if not left:
+                    self.engine.set_in_place(number, act, in_place=True)
+
+
+def _before(step: ActionStep) -> ActionStep:
+    """Another value of what a step sets."""
+    match step.kind:
+        case "start" | "stop":
+            return ActionStep("start" if step.kind == "stop" else "stop", step.target)
+        case "set_property":
+            return ActionStep(step.kind, step.target, step.name, "before")
+        case "connect" | "disconnect":
+            return ActionStep("connect", step.target, step.name, "what was.before")
+        case _:
+            return ActionStep(step.kind, step.target, "before")
+
+
 def _run(
     rules: list[Rule], signals: RecordedSignals, story: list[StoryEntry], span_ns: tuple[int, int]
 ) -> list[Acted]:
-    engine = RuleEngine(rule_specs(rules))
+    replayed = _Replayed(rules)
+    engine = replayed.engine
     events = [*_present(rules, signals), *_adopted(rules, story), *_heard(engine.signals, signals)]
     events.sort(key=lambda event: event.time_ns)
     begin_ns, end_ns = span_ns
-    found: list[Acted] = []
     next_ns = begin_ns
     for time_ns, together in groupby(events, key=lambda event: event.time_ns):
-        next_ns = _until(engine, rules, next_ns, time_ns, found)
+        next_ns = replayed.until(next_ns, time_ns)
         for event in together:
             event.happens(engine)
-        next_ns = _stepped(engine, rules, time_ns, found)
-    _until(engine, rules, next_ns, end_ns + 1, found)
-    return found
+        next_ns = replayed.step(time_ns)
+    replayed.until(next_ns, end_ns + 1)
+    return replayed.found
 
 
 def _present(rules: list[Rule], signals: RecordedSignals) -> Iterator[_Event]:
@@ -128,34 +195,12 @@ def _adopted(rules: list[Rule], story: list[StoryEntry]) -> Iterator[_Event]:
     places = {rule.name: index for index, rule in enumerate(rules)}
     for one in story:
         if one.decision == "adopted" and one.rule in places:
-            yield _Event(one.time_ns, methodcaller("adopt", places[one.rule], one.time_ns))
+            yield _Event(one.time_ns, methodcaller("adopt", places[one.rule], True, one.time_ns))
 
 
 def _heard(heard: Sequence[SignalSpec], signals: RecordedSignals) -> Iterator[_Event]:
     for one in signals.told(heard):
         yield _Event(one.time_ns, methodcaller("tell", one.signal, one.time_ns, one.value))
-
-
-def _until(engine: RuleEngine, rules: list[Rule], next_ns: int, time_ns: int, found: list[Acted]) -> int:
-    """Step as often as the engine asks for before an instant; returns when it asks for the next one."""
-    while next_ns < time_ns:
-        next_ns = max(_stepped(engine, rules, next_ns, found), next_ns + 1)
-    return next_ns
-
-
-def _stepped(engine: RuleEngine, rules: list[Rule], now_ns: int, found: list[Acted]) -> int:
-    """Decide at an instant until nothing more is wanted."""
-    while True:
-        next_ns = engine.step(now_ns)
-        pending = engine.pending
-        if pending is not None:
-            found.append(Acted(now_ns, rules[pending.rule].name, pending.act))
-            engine.begun(now_ns)
-            engine.ended(pending.rule, pending.act, "done", now_ns)
-        while engine.take() is not None:
-            pass  # what it tells of them is of no interest
-        if pending is None:
-            return next_ns
 
 
 def _side_by_side(then: list[Acted], now: list[Acted]) -> list[Compared]:

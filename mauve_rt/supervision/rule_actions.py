@@ -73,7 +73,13 @@ def _actions(file: RulesFile, index: int, runtime: Runtime) -> RuleActions:
     places, steps = zip(*_placed(rule, index), strict=True)
     done = _planned(file, places, rule.do, runtime)
     both = _planned(file, places, steps, runtime)  # what undoes is about what was done
-    return RuleActions(done, undo=both[len(done) :], reserve=rule.otherwise or "stop")
+    return RuleActions(
+        done,
+        undo=both[len(done) :],
+        reserve=rule.otherwise or "stop",
+        takes_over=rule.takes_over,
+        whole=rule.whole,
+    )
 
 
 def _placed(rule: Rule, index: int) -> list[tuple[Location, Step]]:

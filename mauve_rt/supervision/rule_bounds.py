@@ -126,7 +126,8 @@ def _reaction(rule: Rule, periods_s: Mapping[str, float], *, act: str = "do") ->
     else:
         yield BoundPart("the supervisor runs, and its request arrives", SENT_S, assumed=True)
         yield BoundPart("the executor builds, checks and commits", BUILT_S, assumed=True)
-    yield from _release(sorted(touched(rule.steps(act))), periods_s)
+    about = touched(rule.do) if act == "do" else _about(rule)
+    yield from _release(sorted(about), periods_s)
 
 
 def _release(names: list[str], periods_s: Mapping[str, float]) -> Iterator[BoundPart]:

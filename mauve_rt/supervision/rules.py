@@ -9,10 +9,13 @@
         priority: 0                 # of several that hold, the highest decides
         for_s: 0.0                  # the condition must hold so long before `do`
         do: [{kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}]
-        undo: {for_s: 3.0, do: [{kind: replace_core, target: exploration, name: mauve_examples/Exploration}]}
+        undo: {for_s: 3.0}          # what was there before comes back
         cooldown_s: 0.0             # from the outcome of an action to the next action of the rule
         otherwise: stop             # where `do` does not come about: stop, or safe_outputs
         otherwise_after_s: 0.1      # from the instant at which `do` is due
+        safety: false               # above all rules that are not, and above what persons put over rules
+        latch: false                # it ends by `mauve rules reset` only
+        whole: false                # it does nothing while another rule or a person has taken a part of it
 
 What may stand in `when`: see supervision/when.py. One file serves both: the executor runs the rules that are
 `in: executor`; its supervisor runs the others, and those too where the executor does not. Names of topics and
@@ -28,7 +31,7 @@ from mauve_rt.model.kinds import Choice, Faults, Flag, ListOf, Real, Whole
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.steps import STEPS, Step, dotted, form_error
+from mauve_rt.model.steps import ANY_STEPS, STEPS, Step, dotted, form_error
 from mauve_rt.model.yaml_file import Location, YamlFile
 from mauve_rt.supervision.outside import inside_only
 from mauve_rt.supervision.when import When, WhenPart
@@ -42,7 +45,12 @@ class Undo(Section):
     """What a rule does once its condition has been false for `for_s` seconds without a break."""
 
     for_s: float = setting(_SECONDS, "the condition must be false for so long without a break", default=0.0)
-    do: list[Step] = setting(STEPS, "the steps that undo the action")
+    do: list[Step] = setting(
+        ANY_STEPS,
+        "what is in force from then on, unless a person gave the element its value; without the key what was "
+        "there before",
+        default=[],
+    )
 
 
 class Rule(Section):
@@ -60,7 +68,9 @@ class Rule(Section):
     )
     for_s: float = setting(_SECONDS, "the condition must hold for so long without a break", default=0.0)
     do: list[Step] = setting(STEPS, "the action: steps as in a steps file")
-    undo: Undo | None = setting(Part(Undo), "what undoes the action; without the key nothing", default=None)
+    undo: Undo | None = setting(
+        Part(Undo), "when the action is undone; without the key what it did stays", default=None
+    )
     cooldown_s: float = setting(
         _SECONDS, "shortest time from the outcome of an action to the next action of the rule", default=0.0
     )
@@ -75,8 +85,20 @@ class Rule(Section):
 
     takes_over: bool = setting(
         Flag(),
-        "whether the rule undoes what its action does also where somebody else did it",
+        "whether the steps of `undo` are in force at its end also where a person gave the element its value",
         default=False,
+    )
+    safety: bool = setting(
+        Flag(),
+        "ranks above all rules that are not safety rules, and above what persons put over rules; needs "
+        "`otherwise`",
+        default=False,
+    )
+    latch: bool = setting(
+        Flag(), "stays active until `mauve rules reset`, once its condition is false", default=False
+    )
+    whole: bool = setting(
+        Flag(), "does nothing while a rule of higher rank or a person has taken a part of it", default=False
     )
 
     def steps(self, act: str) -> list[Step]:
@@ -86,8 +108,12 @@ class Rule(Section):
         return self.undo.do if self.undo is not None else []
 
     def targets(self) -> set[str]:
-        """Components that must run before the rule is armed: those of which it replaces or sets something."""
-        return {step.target for step in self.do if STEP_KINDS[step.kind].needs_running}
+        """Components that must run before the rule is armed: those of which it replaces or sets something.
+
+        One that it starts or stops itself need not run.
+        """
+        own = {step.target for step in self.do if step.kind in ("start", "stop")}
+        return {step.target for step in self.do if STEP_KINDS[step.kind].needs_running} - own
 
 
 class Rules(Section):
@@ -136,6 +162,7 @@ class RulesFile:
                 what = "only an executor has a reserve action: a supervisor's request may not come through"
                 remedy = "let the executor run the rule, `in: executor`"
                 yield self.problem(("rules", index, "otherwise"), what, remedy=remedy)
+            yield from self._misfits(rule, index)
             for leaf in rule.when.leaves():
                 place = (*leaf.place, leaf.kind)
                 if (error := refusal(leaf)) is not None:
@@ -151,6 +178,19 @@ class RulesFile:
                 elif rule.where == "supervisor" and (what := inside_only(leaf)):
                     remedy = "let the executor run the rule, `in: executor`"
                     yield self.problem((*place,), f"only in the executor {what}", remedy=remedy)
+
+    def _misfits(self, rule: Rule, index: int) -> Iterator[Problem]:
+        """Keys that make no sense together."""
+        for key in ("safety", "latch", "whole", "takes_over"):
+            if getattr(rule, key) and rule.where == "supervisor":
+                what = f"only a rule of the executor can have `{key}`: a supervisor may come to its end"
+                yield self.problem(("rules", index, key), what, remedy="write `in: executor`")
+        if rule.safety and rule.otherwise is None:
+            what = f"safety rule '{rule.name}' has no `otherwise`: nothing happens where its `do` fails"
+            yield self.problem(("rules", index, "safety"), what, remedy="add otherwise: stop")
+        if rule.safety and rule.whole:
+            what = f"safety rule '{rule.name}' may not be `whole`: it would do nothing while a part is taken"
+            yield self.problem(("rules", index, "whole"), what, remedy="leave `whole` out")
 
     def untyped(self, leaf: When) -> Problem:
         """That a condition in the supervisor lacks the type of the topic to which it listens."""

@@ -108,7 +108,7 @@ class Trial:
     def _sign(self, name: str) -> str:
         status = self._rules.status(self._names.index(name))
         if status.in_effect:
-            return "#"
+            return "#" if self._executor.follows(name) else "?"
         if not status.armed:
             return " "
         if not status.known:

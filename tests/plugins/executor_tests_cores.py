@@ -152,10 +152,13 @@ class PyKeeping(PyCounter):
     def act(self) -> None:
         """Count once, or keep it: a PyDLL's functions are called without letting go of the interpreter."""
         awaited = Path(tempfile.gettempdir()) / f"mauve_keeping_{os.getpid()}"
-        if awaited.exists() and (pipe := awaited.read_text("utf-8")) not in ("keeping", "over"):
+        if awaited.exists() and (how := awaited.read_text("utf-8")) not in ("keeping", "over"):
             awaited.write_text("keeping", encoding="utf-8")
             libc = ctypes.PyDLL(None)
-            libc.close(libc.open(pipe.encode(), os.O_RDONLY))
+            if how.isdigit():
+                libc.usleep(int(how) * 1_000_000)
+            else:
+                libc.close(libc.open(how.encode(), os.O_RDONLY))
             awaited.write_text("over", encoding="utf-8")
             time.sleep(0.8)  # its state goes on for longer than a stop of all waits
         super().act()

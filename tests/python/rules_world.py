@@ -1,10 +1,12 @@
 """A world for the rule engine: a model of an executor, in virtual time."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import count
 
+from mauve_rt._kernel import ActionStep, Overlays, OverlaySpec
 from mauve_rt.control.requests import Code, Outcome, Request
+from mauve_rt.control.wishes import are_equal, assignment_of
 from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
 from mauve_rt.supervision.remote_rules import RemoteRules
@@ -25,21 +27,24 @@ def rule(
     usual: str = USUAL,
     **changes: object,
 ) -> Rule:
+    """`undo`: True puts the usual core in again, [] leaves that to the executor, False: there is none."""
     content: dict[str, object] = {
         "name": name,
         "when": {"silence": {"topic": "in", "type": "mauve_msgs/msg/PeerMessage", "longer_than_s": 1.0}},
         "do": [{"kind": "replace_core", "target": target, "name": LOCAL}],
     }
-    if undo:
-        back = [{"kind": "replace_core", "target": target, "name": usual}]
-        do = back if undo is True else undo
-        content["undo"] = {"for_s": undo_for_s, "do": do}
+    if undo is not False:
+        back = [{"kind": "replace_core", "target": target, "name": usual}] if undo is True else undo
+        content["undo"] = {"for_s": undo_for_s} | ({"do": back} if back else {})
     return Rule(**content | changes)
 
 
 @dataclass
 class World:
-    """Virtual time, a peer that speaks every 0.2 s while `talking`, and an executor that answers at once."""
+    """Virtual time, a peer that speaks every 0.2 s while `talking`, and an executor that answers at once.
+
+    The executor decides as the real one does what rules come to, by the kernel's Overlays.
+    """
 
     rules: list[Rule]
     now_s: float = 100.0
@@ -58,6 +63,7 @@ class World:
     decisions: list[Decision] = field(default_factory=list)
     requests: list[Request] = field(default_factory=list)
     asked_at_s: list[float] = field(default_factory=list)
+    ran: list[str] = field(default_factory=list)  # cores that were put in, one after the other
     revision: int = 5
     instance_id: str = "first"
     components: dict[str, ComponentView] = field(default_factory=dict)
@@ -71,15 +77,41 @@ class World:
             ids=map(str, count(1)),
             name=lambda topic: f"/{topic}",
         )
-        self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
+        self._begin()
         self._last_word_s = self.now_s
 
+    def restart(self, instance_id: str = "second") -> None:
+        """Another start of the executor, which knows nothing of the one before and publishes its state."""
+        self.instance_id = instance_id
+        self._begin()
+        self.tell()
+
+    def _begin(self) -> None:
+        self._overlays = Overlays()
+        self.components = {name: ComponentView("RUNNING", USUAL) for name in ("exploration", "mapping")}
+        for name, view in self.components.items():
+            self._overlays.set_base(_core(name, view), "")  # by the file: by no person
+
+    @property
+    def active(self) -> frozenset[str]:
+        """Rules, as the executor says."""
+        return frozenset(overlay.rule for overlay in self._overlays.active())
+
     def tell(self, components: Mapping[str, ComponentView] | None = None) -> None:
-        """The executor publishes its state, changed."""
-        self.components.update(components or {})
+        """The executor publishes its state, changed: by a person, unless a view names another author."""
+        for name, view in (components or {}).items():
+            if name not in self.components or self.components[name].core != view.core:
+                self._overlays.note(_core(name, view), view.authors.get("core", "operator"))
+            self.components[name] = view
         self.revision += 1
         if self.telling:
-            view = ArchitectureView(self.instance_id, self.revision, dict(self.components), self.own_rules)
+            view = ArchitectureView(
+                self.instance_id,
+                self.revision,
+                dict(self.components),
+                rules=self.own_rules,
+                active=self.active,
+            )
             self.engine.on_state(self.now_ns, view)
 
     def run(self, seconds: float) -> None:
@@ -133,16 +165,71 @@ class World:
         if self.refusals:
             self.engine.on_outcome(self.now_ns, request.request_id, self.refusals.pop(0))
             return
-        step = request.steps[0]
-        self.tell({step.target: ComponentView("RUNNING", step.name)})
+        self.take(request)
+        self.tell()
         outcome = Outcome(code=Code.OK, message="done", revision=self.revision)
         self.engine.on_outcome(self.now_ns, request.request_id, outcome)
+
+    def take(self, request: Request) -> None:
+        """The executor carries out a rule's request; tell() publishes it."""
+        stated = [assignment_of(step) for step in request.steps]
+        found = self._overlays.find(request.rule)
+        if not request.release:
+            spec = OverlaySpec(request.rule, stated, priority=request.priority)
+        elif found is not None:
+            stays = are_equal(
+                stated, found.assigns
+            )  # of a rule without `undo`, be the base a person's choice
+            spec = OverlaySpec(
+                request.rule,
+                found.assigns,
+                leaves=stated,
+                priority=found.priority,
+                leaves_over_persons=stays,
+            )
+        else:
+            return
+        overlay = self._overlays.put("", spec)
+        steps = self._overlays.steps_if(overlay, not request.release)
+        self._overlays.set_active(overlay, not request.release)
+        self._overlays.settle_ended()
+        for step in steps:
+            self._do(step)
+
+    def set_already(self, rule: Rule) -> None:
+        """A supervisor before this one has set the rule, or another supervisor."""
+        self.take(Request(rule=rule.name, steps=tuple(rule.do), priority=rule.priority))
+
+    def drop(self, rule: str) -> None:
+        """Somebody else ends the rule at the executor."""
+        self.take(Request(rule=rule, release=True))
+
+    def _do(self, step: ActionStep) -> None:
+        view = self.components.get(step.target)
+        if view is None:
+            return
+        if step.kind == "replace_core":
+            if view.core != step.name:
+                self.ran.append(step.name)
+            view = replace(view, core=step.name)
+        elif step.kind in ("start", "stop"):
+            view = replace(view, state="RUNNING" if step.kind == "start" else "STOPPED")
+        self.components[step.target] = view
 
     def said(self) -> list[str]:
         return [decision.decision for decision in self.decisions]
 
     def cores(self) -> list[str]:
-        return [request.steps[0].name for request in self.requests]
+        """Of the first step of each request; empty: it has none."""
+        return [request.steps[0].name if request.steps else "" for request in self.requests]
+
+    def asked(self) -> list[str]:
+        """What was asked for, in words."""
+        return [f"{'release' if each.release else 'set'} {each.rule}" for each in self.requests]
+
+
+def _core(component: str, view: ComponentView) -> ActionStep:
+    return ActionStep("replace_core", component, view.core)
 
 
 def started(*rules: Rule) -> World:

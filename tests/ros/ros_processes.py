@@ -48,14 +48,14 @@ def _blocked_signals(process_id: int) -> set[int]:
     return blocked
 
 
-def keep_interpreter(executor: "ExecutorProcess", pipe: Path) -> Path:
+def keep_interpreter(executor: "ExecutorProcess", how: str = "5") -> Path:
     """Let the executor's core PyKeeping keep the interpreter; returns a file, to be removed, that says so.
 
-    Until the pipe is opened to write.
+    For `how` seconds, or until the pipe of that path is opened to write.
     """
     file = Path(tempfile.gettempdir()) / f"mauve_keeping_{executor.process.pid}"
     new = file.with_suffix(".new")
-    new.write_text(str(pipe), encoding="utf-8")
+    new.write_text(how, encoding="utf-8")
     return new.replace(file)
 
 

@@ -19,8 +19,12 @@ TYPED_TEST_SUITE(ActionTest, EveryHost, HostNames);
 TYPED_TEST(ActionTest, ReportsOnceWhatEnded) {
   this->add("c");
   this->deploy();
-  Action action({{.kind = "replace_core", .target = "c", .name = "t/Counting"}});
-  ASSERT_TRUE(action.prepare(this->host(), this->architecture.revision())) << action.problem();
+  Action action(true, {}, "r");
+  ASSERT_TRUE(
+      action.prepare(this->host(), 1, {{.kind = "replace_core", .target = "c", .name = "t/Counting"}}, 7))
+      << action.problem();
+  EXPECT_TRUE(action.is_ready(7));
+  EXPECT_FALSE(action.is_ready(8)) << "other steps are wanted by now";
   ASSERT_TRUE(action.begin());
   EXPECT_FALSE(action.begin()) << "once";
   EXPECT_TRUE(action.is_unsettled());
@@ -38,8 +42,12 @@ TYPED_TEST(ActionTest, ReportsOnceWhatEnded) {
 TYPED_TEST(ActionTest, WhatIsCalledOffChangesNothing) {
   this->add("c");
   this->deploy();
-  Action action({{.kind = "replace_core", .target = "c", .name = "t/Counting"}});
-  ASSERT_TRUE(action.prepare(this->host(), this->architecture.revision())) << action.problem();
+  Action action(true, {}, "r");
+  ASSERT_TRUE(
+      action.prepare(this->host(), 1, {{.kind = "replace_core", .target = "c", .name = "t/Counting"}}, 7))
+      << action.problem();
+  EXPECT_TRUE(action.is_ready(7));
+  EXPECT_FALSE(action.is_ready(8)) << "other steps are wanted by now";
   ASSERT_TRUE(action.begin());
   action.call_off();
   ASSERT_TRUE(action.commit());

@@ -1,461 +1,19 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Rules: conditions and what the engine makes of them, by an injected clock.
-#include <gmock/gmock.h>
-#include <gtest/gtest.h>
-
-#include <cmath>
+// What the engine makes of rules, by an injected clock.
+#include <atomic>
 #include <random>
 #include <thread>
 
-#include "mauve_rt/base/error.hpp"
-#include "mauve_rt/rules/engine.hpp"
-#include "mauve_rt/run/task.hpp"
+#include "mauve_rt/base/seam/futex.hpp"
+
+#include "tried_engine.hpp"
 
 namespace mauve::rules::test_engine {
 namespace {
 
+using namespace mauve::rules::test_fixtures;  // NOLINT(google-build-using-namespace): the fixture
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-
-When leaf(const std::string& kind, Parameters parameters) {
-  return {.kind = kind, .parameters = std::move(parameters)};
-}
-When silence(double longer_than_s = 1.0, const std::string& topic = "radio") {
-  return leaf("silence", {{"topic", topic}, {"longer_than_s", longer_than_s}});
-}
-When combine(const std::string& kind, std::vector<When> parts, std::int64_t count = 0) {
-  return {.kind = kind, .parts = std::move(parts), .count = count};
-}
-constexpr time_ns_t ms(std::int64_t milliseconds) { return ms_to_ns(milliseconds); }
-
-/// An engine whose rules are armed at instant 0, and what it decided, in words.
-struct Tried {
-  explicit Tried(std::vector<Rule> rules, bool armed = true) : engine(std::move(rules)) {
-    if (armed) engine.arm(0);
-    take();
-    words.clear();
-  }
-  Signal& signal(std::size_t i = 0) { return *engine.signals().at(i).signal; }
-  /// Steps at each instant that the engine asks for, until then; what it wants is done at once.
-  void run_to(time_ns_t until_ns) {
-    for (;;) {
-      due_ns = engine.step(now_ns);
-      while (engine.pending() && acts) {
-        const PendingAction action = *engine.pending();
-        engine.begun(now_ns);
-        engine.ended(action.rule, action.act, ending, now_ns);
-        due_ns = engine.step(now_ns);
-      }
-      take();
-      if (due_ns > until_ns) break;
-      EXPECT_GT(due_ns, now_ns) << "it asks for an instant to come";
-      now_ns = due_ns;
-      ++steps;
-    }
-    now_ns = until_ns;
-  }
-  void tell(std::size_t i, double value = 0.0) {
-    signal(i).tell(now_ns, value);
-    run_to(now_ns);
-  }
-  void take() {
-    while (const auto decision = engine.take()) {
-      decisions.push_back(*decision);
-      std::string word = std::to_string(decision->stamp_ns / 1'000'000) + " " +
-                         engine.rule(static_cast<std::size_t>(decision->rule)).name + " " +
-                         std::string(name_of(decision->decided));
-      if (decision->why != Why::none) word += " " + std::string(words_of(decision->why));
-      words.push_back(word);
-    }
-  }
-  /// Of the component that the signal is about.
-  void tell_state(std::size_t i, ComponentState state) {
-    const SignalSpec wanted{SignalKind::state, engine.signals().at(i).spec.target};
-    for (const Engine::Heard& heard : engine.signals()) {
-      if (heard.spec == wanted) heard.signal->tell(now_ns, static_cast<double>(state));
-    }
-    run_to(now_ns);
-  }
-  bool holds(std::size_t i = 0) { return engine.status(i).holds(); }
-  Truth truth(std::size_t i = 0) { return engine.status(i).truth; }
-
-  Engine engine;
-  time_ns_t now_ns{0};
-  time_ns_t due_ns{0};
-  Ended ending{Ended::done};
-  bool acts{true};
-  int steps{0};
-  std::vector<Decision> decisions;
-  std::vector<std::string> words;
-};
-
-Rule rule(const std::string& name, When when, std::vector<std::string> about = {}) {
-  return {.name = name, .when = std::move(when), .undoes = true, .about = std::move(about)};
-}
-
-// ---- conditions
-
-TEST(Conditions, SilenceHoldsFromTheInstantAfterItsTimeOn) {
-  Tried tried({rule("r", silence())});
-  tried.run_to(ms(500));
-  tried.tell(0);
-  EXPECT_EQ(ms(1445), tried.due_ns) << "to see that it does not stand still itself";
-  tried.run_to(ms(1500));
-  EXPECT_EQ(ms(1500) + 1, tried.due_ns);
-  EXPECT_FALSE(tried.holds());
-  tried.run_to(ms(1500) + 1);
-  EXPECT_TRUE(tried.holds());
-  EXPECT_EQ(kForever, tried.due_ns) << "only a message can end it";
-  tried.tell(0);
-  EXPECT_FALSE(tried.holds());
-}
-
-TEST(Conditions, BeforeAFirstMessageSilenceCountsFromArmingOn) {
-  Tried tried({rule("r", silence())}, false);
-  tried.signal().tell(ms(1));
-  tried.now_ns = ms(5000);
-  tried.engine.arm(ms(5000));
-  tried.run_to(ms(6000));
-  EXPECT_FALSE(tried.holds());
-  tried.run_to(ms(6001));
-  EXPECT_TRUE(tried.holds());
-}
-
-/// A stall of any length, at any instant: the messages of that time come a little later than the engine goes on.
-TEST(Conditions, AnEngineThatStoodStillTellsThatFromSilence) {
-  std::minstd_rand random(1);
-  for (int stall = 0; stall < 2000; ++stall) {
-    Tried tried({rule("r", silence(0.1))});
-    for (const time_ns_t begins_ns = ms(static_cast<std::int64_t>(20 + random() % 300));
-         tried.now_ns < begins_ns;) {
-      if (tried.now_ns % ms(20) == 0) tried.signal().tell(tried.now_ns);
-      tried.run_to(tried.now_ns + ms(1));
-    }
-    tried.now_ns += ms(static_cast<std::int64_t>(10 + random() % 2000));
-    const auto later_ms = static_cast<std::int64_t>(random() % 45);
-    tried.run_to(tried.now_ns + ms(later_ms));
-    tried.signal().tell(tried.now_ns);
-    tried.run_to(tried.now_ns + ms(90));
-    ASSERT_TRUE(tried.words.empty()) << tried.words.front();
-    tried.run_to(tried.now_ns + ms(11));
-    EXPECT_TRUE(tried.holds()) << "silence is found all the same";
-  }
-}
-
-TEST(Conditions, AnEngineThatNeverComesToRestFindsSilenceAllTheSame) {
-  Tried tried({rule("r", silence(0.1))});
-  for (int look = 0; look < 120; ++look) {
-    tried.now_ns += ms(50);
-    tried.engine.step(tried.now_ns);
-  }
-  EXPECT_TRUE(tried.holds());
-}
-
-TEST(Conditions, SilenceIsProvenAsFarAsTheReceiverHasReported) {
-  Tried tried({rule("r", silence(0.1))});
-  tried.signal().tell(0);
-  tried.signal().set_reported_until(ms(10));
-  tried.run_to(ms(200));
-  EXPECT_FALSE(tried.holds()) << "a message of since then may be waiting";
-  tried.signal().set_reported_until(ms(205));
-  tried.run_to(ms(210));
-  EXPECT_TRUE(tried.holds());
-  EXPECT_EQ(ms(100), tried.engine.status(0).since_ns);
-}
-
-TEST(Conditions, WhatIsAliveWakesNobody) {
-  Tried tried({rule("r", silence())});
-  tried.run_to(0);
-  const std::uint32_t word = tried.engine.word();
-  for (int i = 1; i <= 900; ++i) tried.signal().tell(ms(i));
-  EXPECT_EQ(word, tried.engine.word());
-  tried.run_to(ms(1500));
-  EXPECT_FALSE(tried.holds());
-  EXPECT_LE(tried.steps, 1) << "when silence could have been long enough";
-  tried.run_to(ms(1901));
-  EXPECT_TRUE(tried.holds());
-  tried.signal().tell(ms(1902));
-  EXPECT_NE(word, tried.engine.word());
-}
-
-TEST(Conditions, AValueIsHeldAgainstItsBoundsAndANaNViolatesThem) {
-  Tried tried(
-      {rule("r", leaf("value", {{"resource", "x"}, {"field", "v"}, {"above", 10.0}, {"hysteresis", 2.0}}))});
-  const std::vector<std::pair<double, bool>> told{{10.0, false}, {10.1, true}, {8.5, true},
-                                                  {8.0, false},  {9.9, false}, {NAN, true},
-                                                  {9.0, true},   {7.0, false}, {1e9, true}};
-  for (const auto& [value, holds] : told) {
-    tried.tell(0, value);
-    EXPECT_EQ(holds, tried.holds()) << value;
-  }
-}
-
-TEST(Conditions, ValuesOnTheQuietSideWakeNobody) {
-  Tried tried({rule("r", leaf("value", {{"topic", "t"}, {"field", "v"}, {"below", 0.0}, {"above", 10.0}}))});
-  tried.tell(0, 5.0);
-  std::uint32_t word = tried.engine.word();
-  for (int i = 0; i <= 10; ++i) tried.signal().tell(ms(1), i);
-  EXPECT_EQ(word, tried.engine.word());
-  tried.signal().tell(ms(1), 10.5);
-  EXPECT_NE(word, tried.engine.word());
-  tried.run_to(ms(1));
-  word = tried.engine.word();
-  tried.signal().tell(ms(2), 99.0);
-  EXPECT_EQ(word, tried.engine.word()) << "it is above as before";
-  tried.signal().tell(ms(2), -1.0);
-  EXPECT_NE(word, tried.engine.word());
-}
-
-TEST(Conditions, OverrunsCountWithinATime) {
-  Tried tried(
-      {rule("r", leaf("overruns", {{"component", "c"}, {"at_least", std::int64_t{3}}, {"within_s", 1.0}}))});
-  tried.tell(0, 1);
-  tried.run_to(ms(400));
-  tried.tell(0, 2);
-  tried.run_to(ms(999));
-  tried.tell(0, 3);
-  EXPECT_TRUE(tried.holds());
-  EXPECT_EQ(ms(1000), tried.due_ns);
-  tried.run_to(ms(1000));
-  EXPECT_FALSE(tried.holds());
-  tried.run_to(ms(5000));
-  tried.tell(0, 6);
-  EXPECT_TRUE(tried.holds()) << "three at once";
-}
-
-TEST(Conditions, NoReleaseCountsPeriods) {
-  Tried tried({rule("r", leaf("no_release", {{"component", "c"}, {"periods", 3.0}}))});
-  tried.run_to(ms(100));
-  EXPECT_FALSE(tried.holds()) << "nobody knows its period yet";
-  tried.tell(0, 0.010);
-  tried.run_to(ms(130));
-  EXPECT_EQ(ms(130) + 1, tried.due_ns);
-  EXPECT_FALSE(tried.holds());
-  tried.run_to(ms(131));
-  EXPECT_TRUE(tried.holds());
-  tried.tell(0, 0.010);
-  EXPECT_FALSE(tried.holds());
-}
-
-TEST(Conditions, StatesPeersDiagnosticsAndBooleansAreLookedUp) {
-  Tried tried({rule("fault", leaf("fault", {{"component", "c"}})),
-               rule("peer", leaf("peer", {{"executor", "e"}})),
-               rule("diagnostic", leaf("diagnostic", {{"status", "s"}})),
-               rule("boolean", leaf("boolean", {{"topic", "t"}, {"is", false}}))});
-  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(Truth::unknown, tried.truth(i)) << i;
-  tried.tell_state(0, ComponentState::running);
-  EXPECT_EQ(Truth::no, tried.truth(0));
-  tried.tell_state(0, ComponentState::faulted);
-  EXPECT_EQ(Truth::yes, tried.truth(0));
-  tried.tell(2, static_cast<double>(PeerState::unheard));
-  EXPECT_EQ(Truth::unknown, tried.truth(1)) << "it may be gone";
-  tried.tell(2, static_cast<double>(PeerState::there));
-  EXPECT_EQ(Truth::no, tried.truth(1));
-  tried.tell(2, static_cast<double>(PeerState::gone));
-  EXPECT_EQ(Truth::yes, tried.truth(1));
-  tried.tell(3, 1);
-  EXPECT_EQ(Truth::no, tried.truth(2));
-  tried.tell(3, 2);
-  EXPECT_EQ(Truth::yes, tried.truth(2));
-  tried.tell(4, 1);
-  EXPECT_EQ(Truth::no, tried.truth(3));
-  tried.tell(4, 0);
-  EXPECT_EQ(Truth::yes, tried.truth(3));
-}
-
-TEST(Conditions, ThatAPeerWasNeverReceivedIsKnown) {
-  Tried tried({rule("unheard", leaf("peer", {{"executor", "e"}, {"is", "unheard"}}))});
-  tried.tell(0, static_cast<double>(PeerState::unheard));
-  EXPECT_EQ(Truth::yes, tried.truth());
-  tried.tell(0, static_cast<double>(PeerState::there));
-  EXPECT_EQ(Truth::no, tried.truth());
-}
-
-TEST(Conditions, ThatNothingHappensToAComponentIsUnknownWhileItDoesNotRun) {
-  for (const char* kind : {"overruns", "over_declared", "fault"}) {
-    Tried tried({rule("r", leaf(kind, {{"component", "c"}}))});
-    EXPECT_EQ(Truth::unknown, tried.truth()) << kind;
-    tried.tell_state(0, ComponentState::running);
-    EXPECT_EQ(Truth::no, tried.truth()) << kind;
-    tried.tell_state(0, ComponentState::stopped);
-    EXPECT_EQ(Truth::unknown, tried.truth()) << kind;
-    tried.run_to(ms(5));
-    tried.tell_state(0, ComponentState::running);
-    EXPECT_EQ(Truth::no, tried.truth()) << kind;
-    EXPECT_EQ(ms(5), tried.engine.status(0).since_ns) << "the evidence was broken: " << kind;
-  }
-}
-
-TEST(Conditions, WhatHasHappenedToAComponentIsKnownThoughItStops) {
-  Tried tried({rule("r", leaf("overruns", {{"component", "c"}, {"within_s", 1.0}}))});
-  tried.tell_state(0, ComponentState::running);
-  tried.tell(0, 1);
-  tried.tell_state(0, ComponentState::stopped);
-  EXPECT_EQ(Truth::yes, tried.truth());
-  tried.run_to(ms(1'001));
-  EXPECT_EQ(Truth::unknown, tried.truth());
-}
-
-TEST(Conditions, AFirstValueWithinTheHysteresisShowsNothing) {
-  const auto above = leaf("value", {{"topic", "t"}, {"field", "v"}, {"above", 10.0}, {"hysteresis", 2.0}});
-  Tried tried({rule("r", above)});
-  tried.tell(0, 9.0);
-  EXPECT_EQ(Truth::unknown, tried.truth()) << "it may have been above 10 before";
-  tried.tell(0, 7.0);
-  EXPECT_EQ(Truth::no, tried.truth());
-  tried.tell(0, 9.0);
-  EXPECT_EQ(Truth::no, tried.truth());
-  tried.tell(0, 11.0);
-  tried.tell(0, 9.0);
-  EXPECT_EQ(Truth::yes, tried.truth());
-}
-
-TEST(Conditions, CombinationsFollowKleenesThreeValues) {
-  const auto boolean = [](const char* topic) { return leaf("boolean", {{"topic", topic}}); };
-  const std::vector<When> parts{boolean("a"), boolean("b"), boolean("c")};
-  constexpr std::array kTruths{Truth::no, Truth::yes, Truth::unknown};
-  for (int i = 0; i < 27; ++i) {
-    const std::array told{kTruths[i % 3], kTruths[i / 3 % 3], kTruths[i / 9]};
-    Tried one({rule("all", combine("all", parts)), rule("any", combine("any", parts)),
-               rule("two", combine("at_least", parts, 2)), rule("not", combine("not", {boolean("a")}))});
-    for (std::size_t at = 0; at < one.engine.signals().size(); ++at) {
-      if (const Truth truth = told[at % 3]; truth != Truth::unknown)
-        one.tell(at, truth == Truth::yes ? 1 : 0);
-    }
-    const auto count = [&](Truth truth) { return std::count(told.begin(), told.end(), truth); };
-    const auto at_least = [&](int many) {
-      if (count(Truth::yes) >= many) return Truth::yes;
-      return 3 - count(Truth::no) < many ? Truth::no : Truth::unknown;
-    };
-    EXPECT_EQ(at_least(3), one.truth(0)) << i;
-    EXPECT_EQ(at_least(1), one.truth(1)) << i;
-    EXPECT_EQ(at_least(2), one.truth(2)) << i;
-    EXPECT_EQ(told[0] == Truth::unknown ? Truth::unknown : truth_of(told[0] == Truth::no), one.truth(3)) << i;
-  }
-}
-
-TEST(Conditions, ForNeedsUnbrokenEvidence) {
-  When overruns = leaf("overruns", {{"component", "c"}, {"within_s", 1e-3}});
-  When calm = combine("not", {overruns});
-  calm.for_ns = ms(10);
-  Tried tried({rule("calm", calm)});
-  tried.tell_state(0, ComponentState::running);
-  tried.run_to(ms(9));
-  EXPECT_EQ(Truth::unknown, tried.truth()) << "whether it was calm before nobody knows";
-  tried.tell_state(0, ComponentState::stopped);
-  tried.run_to(ms(20));
-  EXPECT_EQ(Truth::unknown, tried.truth());
-  tried.tell_state(0, ComponentState::running);
-  tried.run_to(ms(29));
-  EXPECT_EQ(Truth::unknown, tried.truth());
-  tried.run_to(ms(31));
-  EXPECT_EQ(Truth::yes, tried.truth());
-  tried.tell(0, 1);
-  EXPECT_EQ(Truth::no, tried.truth());
-  tried.run_to(ms(35));
-  EXPECT_EQ(Truth::no, tried.truth()) << "it was not, and has not been for long enough";
-}
-
-TEST(Conditions, OnePeerLostOfThree) {
-  std::vector<When> peers;
-  for (const char* name : {"a", "b", "c"}) peers.push_back(silence(1.0, name));
-  Tried tried({rule("any", combine("any", peers)), rule("two", combine("at_least", peers, 2)),
-               rule("all", combine("all", peers)), rule("not", combine("not", {silence(1.0, "a")}))});
-  tried.run_to(ms(500));
-  for (const std::size_t i : {1U, 2U, 4U, 5U, 7U, 8U}) tried.tell(i);  // b and c, of three trees
-  tried.run_to(ms(1001));
-  EXPECT_TRUE(tried.holds(0));
-  EXPECT_FALSE(tried.holds(1));
-  EXPECT_FALSE(tried.holds(2));
-  EXPECT_FALSE(tried.holds(3));
-  tried.run_to(ms(1501));
-  EXPECT_TRUE(tried.holds(1));
-  EXPECT_TRUE(tried.holds(2));
-}
-
-TEST(Conditions, ForAndWithinAreCountedFromTheInstantsThemselves) {
-  When held = silence(1.0);
-  held.for_ns = ms(300);
-  When lately = silence(1.0);
-  lately.within_ns = ms(700);
-  Tried tried({rule("for", held), rule("within", lately)});
-  tried.run_to(ms(1299));
-  EXPECT_FALSE(tried.holds(0));
-  EXPECT_TRUE(tried.holds(1));
-  tried.run_to(ms(1301));
-  EXPECT_TRUE(tried.holds(0));
-  tried.tell(1);
-  EXPECT_TRUE(tried.holds(1));
-  EXPECT_EQ(ms(2001), tried.due_ns);
-  tried.run_to(ms(2000));
-  EXPECT_TRUE(tried.holds(1));
-  tried.run_to(ms(2001));
-  EXPECT_FALSE(tried.holds(1));
-}
-
-TEST(Conditions, WhatCannotBeSoIsRefusedInWords) {
-  const auto refusal = [](const When& when) -> std::string {
-    try {
-      Engine engine({rule("r", when)});
-    } catch (const Error& failure) {
-      return failure.what();
-    }
-    return "accepted";
-  };
-  EXPECT_THAT(refusal(leaf("silense", {})), HasSubstr("one of all, any, not, at_least, silence"));
-  EXPECT_THAT(refusal(leaf("silence", {{"topic", "t"}})), HasSubstr("longer_than_s"));
-  EXPECT_THAT(refusal(leaf("silence", {{"longer_than_s", 1.0}})), HasSubstr("a topic or a resource"));
-  EXPECT_THAT(refusal(leaf("silence", {{"topic", "t"}, {"longer_than_s", -1.0}})), HasSubstr("-1"));
-  EXPECT_THAT(refusal(leaf("silence", {{"topic", "t"}, {"longer_than_s", NAN}})), HasSubstr("nan"));
-  EXPECT_THAT(refusal(leaf("silence", {{"topic", "t"}, {"longer", 1.0}, {"longer_than_s", 1.0}})),
-              HasSubstr("correct the name"));
-  EXPECT_THAT(refusal(leaf("peer", {{"executor", "e"}, {"is", std::string("dead")}})), HasSubstr("gone"));
-  EXPECT_THAT(refusal(leaf("value", {{"topic", "t"}, {"field", "f"}})), HasSubstr("above"));
-  EXPECT_THAT(refusal(combine("at_least", {silence()}, 2)), HasSubstr("1 to 1"));
-  EXPECT_THAT(refusal(combine("all", {})), HasSubstr("none"));
-}
-
-TEST(Conditions, EachKindOfTheTableCanBeMadeFromWhatItRequires) {
-  for (const ConditionKind& kind : condition_kinds()) {
-    When when{.kind = kind.name};
-    for (const ParameterSpec& spec : kind.parameters) {
-      if (spec.name == "topic" && kind.name != "boolean") when.parameters["topic"] = std::string("t");
-      if (spec.name == "above") when.parameters["above"] = 1.0;
-      if (!spec.required) continue;
-      if (spec.type == "float") when.parameters[spec.name] = 1.0;
-      if (spec.type != "float") when.parameters[spec.name] = std::string("x");
-    }
-    Tried tried({rule("r", when)});
-    const auto& heard = tried.engine.signals();
-    const auto is_state = [](const auto& each) { return each.spec.kind == SignalKind::state; };
-    const auto states = std::count_if(heard.begin(), heard.end(), is_state);
-    EXPECT_EQ(1 + (states > 0 ? 1 : 0), std::ssize(heard))
-        << "what it is about, and whether that runs: " << kind.name;
-    EXPECT_FALSE(kind.summary.empty());
-    tried.run_to(ms(1));
-    EXPECT_FALSE(tried.holds()) << kind.name;
-  }
-}
-
-// ---- rules
-
-/// Threads wake up a little late: silence is found by the first look after its instant, for all the looks before.
-TEST(Conditions, SilenceIsFoundAtItsInstantThoughEveryLookIsLate) {
-  for (const double limit_s : {0.01, 0.1, 1.0}) {
-    Tried tried({rule("r", silence(limit_s))});
-    const auto due_ns = static_cast<time_ns_t>(limit_s * 1e9);
-    time_ns_t now_ns = 0;
-    while (now_ns < 2 * due_ns) {
-      const time_ns_t next_ns = tried.engine.step(now_ns);
-      if (tried.holds()) break;
-      now_ns = next_ns + us_to_ns(next_ns > due_ns ? 20 : 300);  // the last one less than those before
-    }
-    tried.take();
-    EXPECT_GT(now_ns, due_ns);
-    EXPECT_EQ(Decided::condition_true, tried.decisions.back().decided);
-    EXPECT_LT(tried.decisions.back().stamp_ns, due_ns + us_to_ns(100)) << limit_s;
-  }
-}
 
 TEST(Rules, DoesAndUndoes) {
   Rule link = rule("link", silence(1.0));
@@ -492,23 +50,91 @@ TEST(Rules, AFlappingLinkActsOncePerCooldown) {
   for (std::size_t i = 1; i < acted.size(); ++i) EXPECT_GE(acted[i] - acted[i - 1], ms(2000));
 }
 
-TEST(Rules, TheHighestDecidesAndWhoLostSaysSo) {
+TEST(Rules, EachIsActiveByItselfAndWhoIsOutrankedSaysSo) {
   Rule low = rule("low", silence(1.0, "a"), {"drive"});
   Rule high = rule("high", silence(2.0, "b"), {"drive", "arm"});
   high.priority = 5;
   const Rule apart = rule("apart", silence(1.0, "c"), {"camera"});
   Tried tried({low, high, apart});
   tried.run_to(ms(1500));
-  EXPECT_TRUE(tried.engine.status(0).in_effect);
-  EXPECT_TRUE(tried.engine.status(2).in_effect);
+  EXPECT_TRUE(tried.engine.status(0).active);
+  EXPECT_TRUE(tried.engine.status(2).active);
   tried.run_to(ms(2500));
-  EXPECT_TRUE(tried.engine.status(1).in_effect);
-  EXPECT_FALSE(tried.engine.status(0).in_effect) << "what it did is gone";
+  EXPECT_TRUE(tried.engine.status(1).active);
+  EXPECT_TRUE(tried.engine.status(0).active) << "it goes on to want what it wants";
   EXPECT_EQ("2000 low suppressed outranked by a rule of higher rank", tried.words.back());
   EXPECT_EQ(1, tried.decisions.back().other);
-  tried.tell(1);  // b is heard again: high is undone, and low has its way
-  EXPECT_FALSE(tried.engine.status(1).in_effect);
+  tried.words.clear();
+  tried.tell(1);  // b is heard again: high is undone, to what low wants
+  EXPECT_FALSE(tried.engine.status(1).active);
   EXPECT_TRUE(tried.engine.status(0).in_effect);
+  EXPECT_THAT(tried.words, ElementsAre("2500 high condition_false", "2500 high undo", "2500 high done"));
+}
+
+TEST(Rules, WhoIsOutrankedInAllItWantsHasNothingToDo) {
+  Rule low = rule("low", silence(2.0, "a"), {"drive"});
+  Rule high = rule("high", silence(1.0, "b"), {"drive"});
+  high.priority = 5;
+  Tried tried({low, high});
+  tried.run_to(ms(1500));
+  tried.engine.set_in_place(0, Act::do_, true);
+  tried.words.clear();
+  tried.run_to(ms(2500));
+  EXPECT_THAT(tried.words, ElementsAre("2000 low condition_true",
+                                       "2000 low suppressed outranked by a rule of higher rank"));
+  EXPECT_TRUE(tried.engine.status(0).active);
+}
+
+TEST(Rules, ASafetyRuleIsAboveAllOthers) {
+  Rule safe = rule("safe", silence(1.0), {"drive"});
+  Rule high = rule("high", silence(1.0), {"drive"});
+  safe.safety = true;
+  high.priority = 1000;
+  Tried tried({high, safe});
+  tried.acts = false;
+  tried.run_to(ms(1001));
+  ASSERT_TRUE(tried.engine.pending());
+  EXPECT_EQ(1U, tried.engine.pending()->rule);
+}
+
+TEST(Rules, ALatchedRuleEndsByAResetOnceItsConditionIsFalse) {
+  Rule stop{
+      .name = "stop", .when = leaf("boolean", {{"topic", "pressed"}}), .undoes = true, .about = {"base"}};
+  stop.latch = true;
+  Tried tried({stop});
+  tried.tell(0, 1.0);
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
+  EXPECT_FALSE(tried.engine.reset(0, tried.now_ns)) << "its cause is there";
+  tried.tell(0, 0.0);
+  tried.run_to(s_to_ns(60));
+  EXPECT_TRUE(tried.engine.status(0).active);
+  EXPECT_TRUE(tried.engine.reset(0, tried.now_ns));
+  tried.run_to(tried.now_ns);
+  EXPECT_FALSE(tried.engine.status(0).active);
+  EXPECT_FALSE(tried.engine.status(0).in_effect);
+  EXPECT_FALSE(tried.engine.reset(0, tried.now_ns)) << "it is not active";
+}
+
+TEST(Rules, AnAdoptedLatchedRuleIsNotResetWhileNothingIsKnown) {
+  Rule stop{
+      .name = "stop", .when = leaf("boolean", {{"topic", "pressed"}}), .undoes = true, .about = {"base"}};
+  stop.latch = true;
+  Tried tried({stop});
+  tried.engine.adopt(0, true, 0);
+  tried.run_to(ms(100));
+  EXPECT_FALSE(tried.engine.reset(0, tried.now_ns));
+  EXPECT_TRUE(tried.engine.status(0).active);
+}
+
+TEST(Rules, OneThatIsReleasedEndsAtOnce) {
+  Rule gone = rule("gone", {}, {"drive"});
+  gone.is_released = true;
+  gone.latch = true;
+  Tried tried({gone});
+  tried.engine.adopt(0, true, 0);
+  tried.run_to(ms(1));
+  EXPECT_THAT(tried.words, ElementsAre("0 gone adopted", "0 gone undo", "0 gone done"));
+  EXPECT_FALSE(tried.engine.status(0).is_at_work);
 }
 
 /// Two rules that are due at once; the actions stay under way.
@@ -575,61 +201,13 @@ TEST(Rules, ARuleOfHigherRankHasTheLowerOnesActionCalledOff) {
   EXPECT_FALSE(tried.engine.gives_way(0));
 }
 
-TEST(Rules, ARuleOfHigherRankKeepsItsPlaceWhileItIsMadeReady) {
-  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1000, {"c"})});
-  tried.acts = false;
-  tried.engine.set_ready(1, Act::do_, false);
-  tried.run_to(ms(1100));
-  EXPECT_FALSE(tried.engine.pending());
-  EXPECT_FALSE(tried.engine.may_prepare(0)) << "that would be in the way of the higher one";
+TEST(Rules, NothingAboutItsComponentsIsPreparedWhileAnActionIsUnderWay) {
+  TwoDue tried({"c"});
   EXPECT_TRUE(tried.engine.may_prepare(1));
-  tried.run_to(ms(1101));
-  ASSERT_TRUE(tried.engine.pending()) << "one that cannot leaves the way free";
-  EXPECT_EQ(0U, tried.engine.pending()->rule);
-  EXPECT_TRUE(tried.engine.may_prepare(0));
-}
-
-TEST(Rules, ARuleOfHigherRankKeepsItsPlaceWhereItsActionWasStale) {
-  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1000, {"c"})});
-  tried.acts = false;
-  tried.run_to(ms(1001));
-  time_ns_t wait_ns = ms(10);
-  for (; wait_ns <= ms(80); wait_ns *= 2) {
-    ASSERT_TRUE(tried.engine.pending());
-    EXPECT_EQ(1U, tried.engine.pending()->rule);
-    tried.engine.begun(tried.now_ns);
-    EXPECT_FALSE(tried.engine.may_prepare(0));
-    tried.engine.ended(1, Act::do_, Ended::stale, tried.now_ns);
-    tried.run_to(tried.now_ns + wait_ns - 1);
-    EXPECT_FALSE(tried.engine.pending());
-    EXPECT_FALSE(tried.engine.may_prepare(0));
-    tried.run_to(tried.now_ns + 1);
-  }
-  tried.engine.begun(tried.now_ns);
-  tried.engine.ended(1, Act::do_, Ended::stale, tried.now_ns);
-  tried.run_to(tried.now_ns);
-  ASSERT_TRUE(tried.engine.pending()) << "one that cannot leaves the way free";
-  EXPECT_EQ(0U, tried.engine.pending()->rule);
-}
-
-TEST(Rules, OfTwoThatDoTheSameTheHigherOneHasDoneIt) {
-  Tried tried({TwoDue::ranked("low", 0, {"c"}), TwoDue::ranked("high", 1, {"c"})});
-  tried.acts = false;
-  tried.run_to(ms(500));
-  tried.tell(1);
-  tried.acts = true;
-  tried.run_to(ms(1100));
-  EXPECT_TRUE(tried.engine.status(0).in_effect);
-  tried.engine.set_in_place(1, Act::do_, true, tried.now_ns);
-  tried.run_to(ms(1600));
-  EXPECT_TRUE(tried.engine.status(1).in_effect);
-  for (int i = 0; i < 3; ++i) {
-    tried.engine.set_in_place(0, Act::do_, true, tried.now_ns);
-    tried.engine.set_in_place(1, Act::do_, true, tried.now_ns);
-    tried.run_to(tried.now_ns + ms(1));
-    EXPECT_TRUE(tried.engine.status(1).in_effect) << "the lower one does not take it over";
-    EXPECT_FALSE(tried.engine.status(0).in_effect);
-  }
+  EXPECT_EQ(0U, tried.begin());
+  EXPECT_FALSE(tried.engine.may_prepare(1));
+  tried.engine.ended(0, Act::do_, Ended::done, tried.now_ns);
+  EXPECT_TRUE(tried.engine.may_prepare(1));
 }
 
 /// A rule with a reserve action 200 ms after `do` is due.
@@ -724,29 +302,27 @@ TEST(Rules, WhatFailedIsTriedAgainLaterEachTime) {
   EXPECT_TRUE(tried.engine.status(0).in_effect);
 }
 
-TEST(Rules, ItNeverFightsAPerson) {
+TEST(Rules, WhatIsNoLongerInPlaceIsDoneOnceMore) {
   Tried tried({rule("r", silence(1.0))});
   tried.run_to(ms(1500));
-  tried.engine.set_in_place(0, Act::do_, false, tried.now_ns);
+  tried.words.clear();
+  tried.engine.set_in_place(0, Act::do_, false);  // another value is wanted, or there
   tried.run_to(ms(1600));
-  EXPECT_TRUE(tried.engine.status(0).changed_by_another);
-  EXPECT_THAT(tried.words.back(), HasSubstr("by another requester"));
-  tried.tell(0);
-  tried.run_to(ms(3000));
-  EXPECT_TRUE(tried.engine.status(0).in_effect) << "the next time it acts again";
+  EXPECT_THAT(tried.words, ElementsAre("1500 r do", "1500 r done"));
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
 }
 
 TEST(Rules, WhatIsInPlaceIsNotDoneAgain) {
   Tried tried({rule("r", silence(1.0))});
-  tried.engine.set_in_place(0, Act::do_, true, 0);
+  tried.engine.set_in_place(0, Act::do_, true);
   tried.run_to(ms(1500));
   EXPECT_TRUE(tried.engine.status(0).in_effect);
   EXPECT_EQ("1000 r suppressed it is in effect already", tried.words.back());
 }
 
-TEST(Rules, WhoStartsWhileItIsInEffectUndoesIt) {
+TEST(Rules, WhoStartsWhileItIsActiveUndoesIt) {
   Tried tried({rule("r", silence(1.0))});
-  tried.engine.adopt(0, tried.now_ns);
+  tried.engine.adopt(0, true, tried.now_ns);
   tried.run_to(ms(100));
   EXPECT_TRUE(tried.holds()) << "it held when somebody acted on it";
   EXPECT_TRUE(tried.engine.status(0).in_effect);
@@ -755,10 +331,42 @@ TEST(Rules, WhoStartsWhileItIsInEffectUndoesIt) {
   EXPECT_EQ("100 r done", tried.words.back());
 }
 
+/// While it was undone, to what a lower rule wants, that one has ended.
+TEST(Rules, WhatIsUndoneToSomethingElseThanWhatIsWantedIsUndoneOnceMore) {
+  Tried tried({rule("r", leaf("boolean", {{"topic", "a"}}), {"c"})});
+  tried.engine.set_in_place(0, Act::undo, true);
+  tried.tell(0, 1.0);
+  tried.engine.set_in_place(0, Act::undo, false);
+  tried.tell(0, 0.0);
+  EXPECT_TRUE(tried.engine.status(0).is_at_work) << "not confirmed";
+  tried.words.clear();
+  tried.engine.set_in_place(0, Act::undo, false);
+  tried.run_to(ms(1));
+  EXPECT_THAT(tried.words, ElementsAre("0 r undo", "0 r done"));
+  tried.engine.set_in_place(0, Act::undo, true);
+  EXPECT_FALSE(tried.engine.status(0).is_at_work);
+  tried.engine.set_in_place(0, Act::undo, false);
+  EXPECT_FALSE(tried.engine.status(0).is_at_work) << "what others do later is not its business";
+}
+
+TEST(Rules, WhatIsActiveAgainBeforeItWasUndoneIsDoneWhereItIsNotThere) {
+  Tried tried({rule("r", leaf("boolean", {{"topic", "a"}}), {"c"})});
+  tried.acts = false;
+  tried.engine.adopt(0, false, 0);                // what it did is to be undone ...
+  tried.engine.set_in_place(0, Act::do_, false);  // ... and is not there
+  tried.run_to(ms(1));
+  EXPECT_EQ(Act::undo, tried.engine.pending()->act);
+  tried.acts = true;
+  tried.tell(0, 1.0);
+  EXPECT_TRUE(tried.engine.status(0).in_effect);
+  EXPECT_EQ(Act::do_, tried.decisions.back().act);
+  EXPECT_EQ(Decided::done, tried.decisions.back().decided);
+}
+
 /// An emergency stop by a value that is published once: in effect, and the engine is a new one.
 struct AdoptedStop : Tried {
   AdoptedStop() : Tried({stop()}) {
-    engine.adopt(0, 0);
+    engine.adopt(0, true, 0);
     take();
     words.clear();
   }
@@ -808,34 +416,6 @@ TEST(Rules, WhatWasDueIsStillDoneWhenTheConditionBecomesUnknown) {
   EXPECT_FALSE(tried.engine.status(0).in_effect);
 }
 
-TEST(Rules, WhatARuleTookCountsFromWhenItWasEntitled) {
-  Rule low{.name = "low",
-           .when = leaf("boolean", {{"topic", "a"}}),
-           .for_ns = ms(100),
-           .undoes = true,
-           .about = {"c"}};
-  Rule high = low;
-  high.name = "high";
-  high.when = leaf("boolean", {{"topic", "b"}});
-  high.priority = 9;
-  Tried tried({low, high});
-  tried.tell(1, 1.0);
-  tried.run_to(ms(500));
-  tried.tell(0, 1.0);  // due at 600, and outranked
-  tried.run_to(ms(7'000));
-  tried.tell(1, 0.0);
-  tried.run_to(ms(8'000));
-  const auto done = std::find_if(tried.decisions.rbegin(), tried.decisions.rend(), [](const Decision& one) {
-    return one.decided == Decided::done && one.rule == 0;
-  });
-  ASSERT_NE(tried.decisions.rend(), done);
-  EXPECT_EQ(ms(500), done->cause_ns);
-  EXPECT_EQ(ms(7'000) - ms(600), done->held_ns);
-  for (const Decision& one : tried.decisions) {
-    EXPECT_TRUE(one.rule == 0 || one.held_ns == 0);
-  }
-}
-
 TEST(Rules, WhoFailsSaysSoUntilItSucceedsOrItsConditionEnds) {
   Tried tried({{.name = "r", .when = leaf("boolean", {{"topic", "a"}}), .undoes = true, .about = {"c"}}});
   tried.ending = Ended::refused;
@@ -852,29 +432,22 @@ TEST(Rules, WhoFailsSaysSoUntilItSucceedsOrItsConditionEnds) {
   EXPECT_FALSE(tried.engine.status(0).failed);
 }
 
-TEST(Rules, WhatSomebodyElseDidIsNotUndone) {
-  Rule undoing = rule("r", silence(1.0));
-  for (const bool takes_over : {false, true}) {
-    SCOPED_TRACE(takes_over);
-    undoing.takes_over = takes_over;
-    for (const bool is_before : {false, true}) {
-      SCOPED_TRACE(is_before);
-      Tried tried({undoing});
-      tried.engine.set_own(0, false);
-      tried.engine.set_in_place(0, Act::do_, true, 0);
-      if (is_before) tried.engine.adopt(0, tried.now_ns);  // as who arms the rule would
-      tried.run_to(ms(1500));
-      EXPECT_EQ(takes_over, tried.engine.status(0).in_effect);
-      tried.tell(0);
-      tried.run_to(ms(1600));
-      const auto undone = std::count_if(tried.decisions.begin(), tried.decisions.end(),
-                                        [](const Decision& one) { return one.decided == Decided::undo; });
-      EXPECT_EQ(takes_over ? 1 : 0, undone);
-      tried.engine.set_in_place(0, Act::do_, false, tried.now_ns);  // and the other one takes it back
-      tried.run_to(ms(3500));
-      EXPECT_TRUE(tried.engine.status(0).in_effect) << "the next time it acts again";
-    }
+TEST(Rules, WhatARuleTookCountsFromWhenItsCooldownWasOver) {
+  Rule link = rule("r", leaf("boolean", {{"topic", "a"}}), {"c"});
+  link.for_ns = ms(100);
+  link.cooldown_ns = ms(2'000);
+  Tried tried({link});
+  tried.tell(0, 1.0);
+  tried.run_to(ms(200));
+  tried.tell(0, 0.0);
+  tried.run_to(ms(2'200));  // undone at 2100
+  tried.tell(0, 1.0);
+  tried.run_to(ms(5'000));
+  std::vector<std::pair<time_ns_t, time_ns_t>> held;  // of each outcome: when, and for how long
+  for (const Decision& one : tried.decisions) {
+    if (one.decided == Decided::done) held.emplace_back(one.stamp_ns / 1'000'000, one.held_ns / 1'000'000);
   }
+  EXPECT_THAT(held, ElementsAre(std::pair(100, 0), std::pair(2'100, 1'900), std::pair(4'100, 1'800)));
 }
 
 TEST(Rules, WhatIsNotReadyIsNotWishedAndSaysSo) {

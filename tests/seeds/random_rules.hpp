@@ -115,6 +115,7 @@ class RandomRules {
 
   /// One set of rules, from its loading to its end.
   void run_rules(bool is_last) {
+    ++sets_;
     known_.clear();
     const int count = contends_ ? 2 + dice_.below(4) : components_;
     std::vector<rules::Rule> rules;
@@ -224,6 +225,22 @@ class RandomRules {
                                                     std::to_string(beats.empty() ? 0.0 : beats.back().value));
     }
   }
+  /// Of the first set: where each rule about a component undoes, and none is active, it is as it was declared.
+  void expect_back(const std::vector<rules::RuleFacts>& facts) {
+    for (int component = 0; component < components_ && sets_ == 1; ++component) {
+      const std::string name = "c" + std::to_string(component);
+      bool is_expected = !has_interfered_ && RuleParts::hung_states == 0;
+      for (std::size_t i = 0; i < known_.size(); ++i) {
+        if (known_[i].rule.about.front() != name) continue;
+        is_expected = is_expected && known_[i].is_good && known_[i].rule.undoes && facts[i].status.armed &&
+                      !facts[i].status.active;
+      }
+      if (!is_expected) continue;
+      findings_.count("components back");
+      const std::string core = architecture_->component(name).shown().core;
+      expect(core == "r/First", name + " runs " + core + ", and no rule wants it");
+    }
+  }
   static void pause(time_ns_t length_ns) {
     time_ns_t stalled_ns = -1;
     do {
@@ -246,20 +263,37 @@ class RandomRules {
           std::ranges::count_if(known_, [&](const KnownRule& other) { return other.contends(known); }) == 1;
       const std::string what = known.rule.name + ", problem '" + facts[i].problem + "', component in state " +
                                std::to_string(static_cast<int>(task_state)) + ": ";
-      if (!has_interfered_ && is_alone)
-        expect(!history_->has_told(static_cast<int>(i), rules::Why::changed_by_another),
-               what + "takes a change for one of somebody else");
       if (!is_alone || !known.is_good || RuleParts::hung_states > 0) continue;
       findings_.count("rules settled");
-      if (status.holds() && !status.changed_by_another)
-        expect(status.in_effect, what + "its condition holds, and it is not in effect");
+      if (status.holds()) expect(status.in_effect, what + "its condition holds, and it is not in effect");
       if (status.truth == rules::Truth::no)
         expect(!status.in_effect || !known.rule.undoes, what + "it is not undone");
       if (status.in_effect) expect_in_place(known, what);
     }
+    expect_wanted(facts);
+    expect_back(facts);
+  }
+  /// Each element is as the highest active rule wants it, also where several want something else.
+  void expect_wanted(const std::vector<rules::RuleFacts>& facts) {
+    const ArchitectureDescription description = architecture_->describe();
+    for (const HeldElement& held : architecture_->overlays().table()) {
+      const auto is_about_it = [&](const KnownRule& known) {
+        return known.rule.about.front() == held.element.target;
+      };
+      bool is_expected = !has_interfered_ && RuleParts::hung_states == 0 && held.wanted.step.has_value();
+      for (std::size_t i = 0; i < known_.size(); ++i)
+        is_expected =
+            is_expected && (!is_about_it(known_[i]) || (known_[i].is_good && facts[i].status.armed));
+      if (!is_expected) continue;
+      findings_.count("elements wanted");
+      const auto now = present(description, held.element);
+      expect(now && is_same_effect(*now, *held.wanted.step),
+             held.element.target + " " + held.element.name + " is not as " + held.wanted.rule + " wants it");
+    }
   }
   void expect_in_place(const KnownRule& known, const std::string& what) {
-    const std::optional<bool> is_so = rules::is_in_place(known.actions.do_steps, architecture_->describe());
+    const auto overlay = architecture_->overlays().find(known.rule.name);
+    const auto is_so = architecture_->overlays().is_so(*overlay, true, architecture_->describe());
     expect(is_so.value_or(true), what + "it is in effect, and what it does is not there");
   }
   /// The runner has ended: nothing changes any more.
@@ -281,6 +315,7 @@ class RandomRules {
   rules::RuleRunner* runner_{nullptr};
   RuleHistory* history_{nullptr};
   int components_{0};
+  int sets_{0};  // of rules, that were at work so far
   std::vector<KnownRule> known_;
   std::map<std::string, std::vector<Beat>> beats_;
   bool has_interfered_{false};

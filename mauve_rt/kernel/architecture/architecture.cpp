@@ -170,6 +170,7 @@ void Architecture::bring_back(Component& hung) {
   constexpr time_ns_t kEarlierChanges = s_to_ns(5);
   constexpr time_ns_t kBetweenTries = ms_to_ns(1);
   const auto probation = hung.present_probation();
+  if (probation != nullptr) reject_core(hung.name(), probation->record().to_core);
   const time_ns_t until = later_by(monotonic_now_ns(), kEarlierChanges);
   for (;; sleep_for(kBetweenTries)) {
     Transaction change;
@@ -214,7 +215,10 @@ void Architecture::settle_probations() noexcept {
     drop_stale_prepared();  // they refer to the core that goes now
     component->settle_probation();
     component->settle_shadow();
-    if (is_reverted) note_author(component->name(), "core", "probation");
+    if (is_reverted) {
+      authors_.note(component->name(), "core", "probation");
+      if (probation != nullptr) reject_core(component->name(), probation->record().to_core);
+    }
     const CommitGate::Look table(commit_gate_);
     mark.release();
   }

@@ -77,7 +77,23 @@ std::string text_of(const ResourceFacts& facts) {
   return text;
 }
 
+Assigned assigned_by(const TransactionStep& step) {
+  Assigned assigned{.element = {.target = step.target, .name = step.element()},
+                    .step = {.kind = std::string(step.kind()), .target = step.target, .name = step.name}};
+  if (const auto* value = std::get_if<PropertyValue>(&step.value)) assigned.step.value = *value;
+  return assigned;
+}
+
+Assigned core_of(const std::string& component, const std::string& core) {
+  return {.element = {.target = component, .name = "core"},
+          .step = {.kind = "replace_core", .target = component, .name = core}};
+}
+
 }  // namespace
+
+void Architecture::reject_core(const std::string& component, const std::string& core) {
+  if (!core.empty()) overlays_.reject(core_of(component, core));
+}
 
 ArchitectureDescription Architecture::describe() const {
   ArchitectureDescription description;
@@ -102,16 +118,25 @@ std::vector<Authored> Architecture::authors() const {
   return found;
 }
 
-void Architecture::note_author(const std::string& target, const std::string& element,
-                               const std::string& author) {
-  authors_.note(target, element, author);
+void Architecture::note_author(const Assigned& assigned, const std::string& author) {
+  authors_.note(assigned.element.target, assigned.element.name, author);
+  overlays_.note(assigned, author);
 }
 
 void Architecture::note_authors(const Transaction& transaction) {
   for (const auto& step : transaction.steps()) {
     if (step->removes()) authors_.forget(step->target);
-    if (!step->is_for_all()) authors_.note(step->target, step->element(), transaction.author());
+    if (!step->is_for_all()) note_author(assigned_by(*step), transaction.author());
   }
+}
+
+void Architecture::follow(const Overlays::Look& look, const ArchitectureDescription& description) {
+  std::vector<Assigned> faulted;
+  for (const auto& component : components()) {
+    if (const std::string core = component->faulted_core(); !core.empty())
+      faulted.push_back(core_of(component->name(), core));
+  }
+  overlays_.follow(look, description, authors(), faulted);
 }
 
 std::string to_string(const ArchitectureDescription& description) {

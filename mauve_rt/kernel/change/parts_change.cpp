@@ -156,8 +156,10 @@ void PartsChange::exchange_core() noexcept {
   const bool had_fallen_back = component_.task_.has_fallen_back();
   component_.task_.set_fallen_back(fallen_back_);
   fallen_back_ = had_fallen_back;
-  // relaxed: a lone fact
+  // relaxed: lone facts
   core_name_ = component_.core_name_.exchange(core_name_, std::memory_order_relaxed);
+  if (component_.task_.has_fallen_back())
+    component_.faulted_core_.store(core_name_, std::memory_order_relaxed);
 }
 
 void PartsChange::exchange_fsm() noexcept {

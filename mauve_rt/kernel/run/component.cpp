@@ -124,6 +124,11 @@ ShownParts Component::shown() const {
   return shown;
 }
 
+std::string Component::faulted_core() const {
+  // relaxed: a lone fact
+  return task_.has_fallen_back() ? TraceNames::word(faulted_core_.load(std::memory_order_relaxed)) : "";
+}
+
 std::shared_ptr<const StateTimes> Component::state_times() const {
   const LockGuard lock(shown_mutex_);
   return shown_times_;

@@ -287,8 +287,8 @@ def _standing(facts: RuleFacts) -> str:
         return "not armed: what it is about does not run"
     if status.in_effect:
         return "in effect"
-    if status.changed_by_another:
-        return "what it did was changed by another requester: it waits for its condition's end"
+    if status.active:
+        return "active: what it does is not done yet"
     if not status.known:
         return "its condition is unknown: nothing was received yet of what it is about"
     return "its condition holds" if status.holds else "watching"

@@ -2,7 +2,7 @@
 
 import functools
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -356,7 +356,7 @@ class ExecutorNode(LifecycleNode):
         self._runtime.cleanup()
         self._properties.follow()
 
-    def _load_rules(self, path: str) -> tuple[Code, str]:
+    def _load_rules(self, path: str, release: Sequence[str]) -> tuple[Code, str]:
         """Rules in the place of the present ones; not while a transition starts or ends threads."""
         with self._starting_or_ending:
             if not self._runtime.configured:
@@ -364,7 +364,7 @@ class ExecutorNode(LifecycleNode):
                     Code.NOT_ACTIVE,
                     "configure the executor first: nothing is there that rules could be about",
                 )
-            return load_reply(self._rules, path)
+            return load_reply(self._rules, path, release)
 
     def _tell_health(self) -> None:
         if self._node_watch is not None:

@@ -9,7 +9,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_msgs.msg import SupervisorDecision
-from mauve_rt._kernel import RuleFacts, RuleRunner, ToldDecision, monotonic_ns
+from mauve_rt._kernel import Overlay, RuleFacts, RuleRunner, ToldDecision, monotonic_ns
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
@@ -25,6 +25,15 @@ KEPT_DECISIONS = 100
 _WAIT_NS = 200_000_000  # how long the thread that tells may go on waiting when it should end
 
 
+class ActiveSafetyRuleError(MauveError):
+    """A safety rule is active, and the new rules lack it."""
+
+    def __init__(self, rule: str) -> None:
+        super().__init__(
+            f"safety rule '{rule}' is active, and the file lacks it; to let go of it: --release {rule}"
+        )
+
+
 class OwnRules:
     """Those of one file at a time, from configure() to close(); they are at work from start() to stop().
 
@@ -32,8 +41,9 @@ class OwnRules:
     | ---------- | ----------------------------------- | --------- | ------------------- |
     | `_loaded`  | configure(), load(), close()        | the same  | `_lock`             |
     | `_runner`, | start(), stop(), load(), close()    | any       | `_lock` to write; each |
-    | `_at_work` |                                     |           | is exchanged whole  |
-    | `_rested`  | the same                            | the same  | `_lock`             |
+    | `_names`   |                                     |           | is exchanged whole  |
+    | `_rested`, | the same                            | the same  | `_lock`             |
+    | `_known`   |                                     |           |                     |
     """
 
     def __init__(
@@ -68,7 +78,8 @@ class OwnRules:
         self._loaded: LoadedRules | None = None
         self._runner: RuleRunner | None = None
         self._rested: RuleRunner | None = None  # stopped: what the next one goes on from
-        self._at_work: list[str] = []
+        self._names: list[str] = []
+        self._known: dict[str, Rule] = {}  # of all files since the start, by name: the last one
         self._ending = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -90,8 +101,8 @@ class OwnRules:
             MauveError: a rule hears something that there is not.
         """
         with self._lock:
-            if self._loaded is not None and self._loaded.rules:
-                self._begin(self._loaded)
+            if self._loaded is not None:
+                self._begin_if_any(self._loaded)
 
     def stop(self) -> None:
         """Nothing is done after this; all that was decided is told. The rules go on at the next start()."""
@@ -104,10 +115,13 @@ class OwnRules:
             self._end()
             self._loaded = self._rested = None
 
-    def load(self, path: str) -> int:
+    def load(self, path: str, release: Sequence[str] = ()) -> int:
         """Put the rules of a file in the place of the present ones, all or none; returns how many there are.
 
+        `release`: active safety rules that may be gone.
+
         Raises:
+            ActiveSafetyRuleError: one is gone that is active, and not among these.
             MauveError: they cannot be used; the present ones go on.
         """
         with self._lock:
@@ -117,14 +131,14 @@ class OwnRules:
             if self._runner is None:
                 self._rested = None  # the check of the new ones listens to the same components
             loaded = self._load(Path(path) if path or before is None else before.path)
+            self._check_release(loaded, release)
             if self._runner is not None or self._runtime.active:
                 self._end()
                 try:
-                    if loaded.rules:
-                        self._begin(loaded)
+                    self._begin_if_any(loaded)
                 except MauveError:
-                    if before is not None and before.rules:
-                        self._begin(before)
+                    if before is not None:
+                        self._begin_if_any(before)
                     raise
             self._loaded, self._rested = loaded, None
             return len(loaded.rules)
@@ -143,20 +157,40 @@ class OwnRules:
         full = {name: self._node.resolve_topic_name(name) for name in said if name}
         return {name: bound[topic] for name, topic in full.items() if topic in bound}
 
+    def _at_work(self) -> list[Overlay]:
+        """What the executor's rules want or have not undone yet."""
+        overlays = self._runtime.overlays()
+        return overlays.at_work("") if overlays is not None else []
+
+    def _check_release(self, loaded: "LoadedRules", release: Sequence[str]) -> None:
+        names = {rule.name for rule in loaded.rules}
+        for overlay in self._at_work():
+            if overlay.safety and overlay.is_active and overlay.rule not in {*names, *release}:
+                raise ActiveSafetyRuleError(overlay.rule)
+
+    def _begin_if_any(self, loaded: "LoadedRules") -> None:
+        """Where there are none, but some that are gone have to be undone, too."""
+        if loaded.rules or self._at_work():
+            self._begin(loaded)
+
     def _begin(self, loaded: "LoadedRules") -> None:
         topics = self._topics_of(loaded.rules)
+        self._known.update({rule.name: rule for rule in loaded.rules})
+        names = {rule.name for rule in loaded.rules}
+        # As the runner adds them: those that are gone, and not undone yet.
+        released = [self._known[each.rule] for each in self._at_work() if each.rule not in names]
         runner = loaded.runner(self._runtime.host, topics, self._rested)
         self._rested = None
         self._listen(_silent(loaded.rules, topics))
         runner.start()
-        self._runner, self._at_work = runner, [rule.name for rule in loaded.rules]
+        self._runner, self._names = runner, [rule.name for rule in loaded.rules]
         self._ending.clear()
-        tell = self._teller(runner, loaded)
+        tell = self._teller(runner, loaded, released)
         self._thread = self._watch.thread("rules", tell, ending=self._ending)
         self._thread.start()
 
     def _end(self) -> None:
-        runner, self._runner, self._at_work = self._runner, None, []
+        runner, self._runner, self._names = self._runner, None, []
         if runner is None:
             return
         runner.stop()
@@ -172,7 +206,12 @@ class OwnRules:
 
     def names(self) -> list[str]:
         """Of the rules that are at work."""
-        return self._at_work
+        return self._names
+
+    def reset(self, rule: str) -> str:
+        """End an active rule whose condition is false, be it latched; "": done, else why not."""
+        runner = self._runner
+        return runner.reset(rule) if runner is not None else "the executor's rules are not at work"
 
     def beat(self) -> None:
         """Say that the executor's Python side works."""
@@ -191,10 +230,12 @@ class OwnRules:
 
     # ---- telling
 
-    def _teller(self, runner: RuleRunner, loaded: "LoadedRules") -> Callable[[], None]:
+    def _teller(
+        self, runner: RuleRunner, loaded: "LoadedRules", released: Sequence["Rule"]
+    ) -> Callable[[], None]:
         name = self._node.resolve_topic_name
         who = self._node.get_fully_qualified_name()
-        messages = loaded.messages(self._runtime, who=who, name=name)
+        messages = loaded.messages(self._runtime, released, who=who, name=name)
         tell_one = self._watch.guarded("a decision", self._tell)
 
         reported = 0
@@ -239,10 +280,12 @@ def _silent(rules: Sequence["Rule"], topics: Mapping[str, str]) -> set[str]:
     return {str(one.get("resource") or topics.get(str(one.get("topic")), "")) for one in silences} - {""}
 
 
-def load_reply(rules: OwnRules, path: str) -> tuple[Code, str]:
+def load_reply(rules: OwnRules, path: str, release: Sequence[str] = ()) -> tuple[Code, str]:
     """What comes of loading a file: the code and the words of a reply."""
     try:
-        count = rules.load(path)
+        count = rules.load(path, release)
+    except ActiveSafetyRuleError as error:
+        return Code.ACTIVE_SAFETY_RULE, str(error)
     except (ArchitectureFileError, ParameterError) as error:
         return Code.INVALID, str(error)
     except MauveError as error:

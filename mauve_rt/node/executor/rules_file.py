@@ -47,9 +47,11 @@ class LoadedRules:
         """What runs them, not started yet; `before`: whose place it takes."""
         return RuleRunner(host, rule_specs(self.rules, with_reserve=True), self.actions, dict(topics), before)
 
-    def messages(self, runtime: Runtime, *, who: str, name: Callable[[str], str]) -> DecisionMessages:
-        """What makes messages of their decisions."""
-        return DecisionMessages(self.rules, runtime, who=who, name=name)
+    def messages(
+        self, runtime: Runtime, released: Sequence[Rule], *, who: str, name: Callable[[str], str]
+    ) -> DecisionMessages:
+        """What makes messages of their decisions; `released`: of the runner, too."""
+        return DecisionMessages([*self.rules, *released], runtime, who=who, name=name)
 
     @staticmethod
     def infos(facts: Sequence[RuleFacts]) -> list[Any]:

@@ -2,7 +2,7 @@
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
@@ -17,8 +17,10 @@ from mauve_msgs.srv import (
     Mirror,
     ReadValues,
     Reconfigure,
+    ReleaseRules,
     Reload,
     ReplaceCore,
+    ResetRule,
     Start,
     StartRecording,
     Stop,
@@ -72,7 +74,7 @@ class Services:
         state: StatePublisher,
         parameters: Parameters,
         rules: OwnRules,
-        load_rules: Callable[[str], tuple[Code, str]],
+        load_rules: Callable[[str, Sequence[str]], tuple[Code, str]],
         warnings: Callable[[], list[str]],
         watch: Watch,
         control_group: CallbackGroup,
@@ -98,6 +100,8 @@ class Services:
         node.create_service(LoadRules, "~/load_rules", self._on_load_rules, callback_group=control_group)
         for service, name, answer in (
             (ListChanges, "~/list_changes", self._list_changes),
+            (ResetRule, "~/reset_rule", self._reset_rule),
+            (ReleaseRules, "~/release_rules", self._release_rules),
             (AbandonChange, "~/abandon_change", self._abandon_change),
         ):
             node.create_service(service, name, answer, callback_group=control_group)
@@ -240,11 +244,37 @@ class Services:
         return response
 
     def _on_load_rules(self, request: Any, response: Any) -> Any:
-        code, response.message = self._load_rules(request.path)
+        code, response.message = self._load_rules(request.path, request.release)
         response.success, response.code = code is Code.OK, int(code)
         self._state.refresh(again=True)
         response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
         text = f"rules of {request.path or 'the same file'}: {response.message}"
+        (self._logger.info if response.success else self._logger.error)(text)
+        return response
+
+    def _reset_rule(self, request: Any, response: Any) -> Any:
+        code, response.message = Code.INVALID, "name a rule or a component"
+        if request.rule:
+            refusal = self._rules.reset(request.rule)
+            code = Code.CONDITION_NOT_FALSE if refusal else Code.OK
+            response.message = refusal or f"rule {request.rule} has ended"
+        elif request.component and self._runtime.configured:
+            outcome = self._control.forgive(request.component)
+            code, response.message = outcome.code, outcome.message
+        return self._answered(response, code, f"reset_rule {request.rule or request.component}")
+
+    def _release_rules(self, request: Any, response: Any) -> Any:
+        code, response.message = Code.NOT_ACTIVE, "the executor is not active"
+        if self._runtime.configured:
+            outcome = self._control.release(request.rule)
+            code, response.message = outcome.code, outcome.message
+        return self._answered(response, code, f"release_rules {request.rule}")
+
+    def _answered(self, response: Any, code: Code, what: str) -> Any:
+        response.success, response.code = code is Code.OK, int(code)
+        self._state.refresh(again=True)
+        response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
+        text = f"{what}: {response.message}"
         (self._logger.info if response.success else self._logger.error)(text)
         return response
 
@@ -292,17 +322,28 @@ def _stop(ros: Any) -> Request:
 
 
 def _start(ros: Any) -> Request:
-    return Request(steps=(Step("start", ros.component),), clock_ns=ros.clock_ns, **_common(ros))
+    step = Step("start", ros.component)
+    return Request(steps=(step,), clock_ns=ros.clock_ns, over=ros.over, **_common(ros))
 
 
 def _replace_core(ros: Any) -> Request:
     step = Step("replace_core", ros.component, ros.core, _probation_value(ros))
-    return Request(steps=(step,), **_commit(ros), **_common(ros))
+    return Request(steps=(step,), over=ros.over, base=ros.base, **_commit(ros), **_common(ros))
 
 
 def _reconfigure(ros: Any) -> Request:
     steps = tuple(Step(step.kind, step.target, step.name, step.value) for step in ros.steps)
-    return Request(steps=steps, dry_run=ros.dry_run, rule=ros.rule, **_commit(ros), **_common(ros))
+    return Request(
+        steps=steps,
+        dry_run=ros.dry_run,
+        rule=ros.rule,
+        release=ros.release,
+        priority=ros.priority,
+        over=ros.over,
+        base=ros.base,
+        **_commit(ros),
+        **_common(ros),
+    )
 
 
 def _reload(ros: Any) -> Request:

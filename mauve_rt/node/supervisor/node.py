@@ -166,6 +166,8 @@ class Supervisor:
             ],
             dry_run=request.dry_run,
             rule=request.rule,
+            release=request.release,
+            priority=request.priority,
         )
         on_reply = self.watch.guarded("the executor's reply", self._on_reply)
         self._call(client, message).add_done_callback(lambda future: on_reply(request.request_id, future))

@@ -14,7 +14,7 @@ from mauve_rt._kernel import ComponentDescription
 from mauve_rt.control import control as executor_control
 from mauve_rt.control.control import Control
 from mauve_rt.control.reports import message_of, reports_of
-from mauve_rt.control.requests import NOT_MEASURED, Code, Outcome, Request, Step
+from mauve_rt.control.requests import NOT_MEASURED, OVER_RULES, Code, Outcome, Request, Step
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.interfaces.descriptions import component_infos
 from mauve_rt.model import load_architecture
@@ -562,7 +562,7 @@ def test_the_author_of_each_change_is_known(runtime: Runtime, control: Control) 
         f"port set={by_mauve}",
         f"property step={by_mauve}",
     ]
-    assert control.handle(Request(steps=REMOVE, requested_by="mauve")).success
+    assert control.handle(Request(steps=REMOVE, requested_by="mauve", over=OVER_RULES)).success
     assert {target: runtime.authors()[target] for target in ("second", "sum")} == {
         "second": {"": "mauve"},
         "sum": {"": "mauve"},

@@ -21,8 +21,7 @@ rules:
   - name: quiet
     when: WHEN
     do: [{kind: replace_core, target: metronome, name: mauve_examples/DO}]
-    takes_over: OVER
-    undo: {for_s: 0.5, do: [{kind: replace_core, target: metronome, name: mauve_examples/UNDO}]}
+    undo: {for_s: 0.5UNDO}
 """
 SILENCE = "{silence: {topic: peer, type: std_msgs/msg/Float64, longer_than_s: 2.0}}"
 VALUE = "{value: {topic: peer, type: std_msgs/msg/Float64, field: data, above: 1}}"
@@ -31,14 +30,12 @@ VALUE = "{value: {topic: peer, type: std_msgs/msg/Float64, field: data, above: 1
 class Stage:
     """The metronome and its supervisor."""
 
-    def __init__(
-        self, folder: Path, *, do: str, undo: str, when: str = SILENCE, takes_over: str = "false"
-    ) -> None:
+    def __init__(self, folder: Path, *, do: str, undo: str, when: str = SILENCE) -> None:
         share = share_folder("mauve_examples")
         assert share is not None
         rules = folder / "rules.yaml"
-        text = RULES.replace("UNDO", undo).replace("DO", do).replace("WHEN", when)
-        text = text.replace("OVER", takes_over)
+        back = f", do: [{{kind: replace_core, target: metronome, name: mauve_examples/{undo}}}]"
+        text = RULES.replace("UNDO", back if undo else "").replace("DO", do).replace("WHEN", when)
         rules.write_text(text, encoding="utf-8")
         self.time = Simulation()
         self.topics = SimulatedTopics()
@@ -80,22 +77,21 @@ def stage(tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.Mo
 OF_THE_FILE = {"do": "Metronome", "undo": "Accelerando"}  # what the rule does is in effect from the start
 
 
-@pytest.mark.parametrize("stage", [OF_THE_FILE | {"takes_over": "true"}], indirect=True)
-def test_what_the_file_put_in_is_taken_over_and_undone_where_the_rule_says_so(stage: Stage):
+@pytest.mark.parametrize("stage", [OF_THE_FILE], indirect=True)
+def test_the_steps_of_undo_are_in_force_at_the_end(stage: Stage):
     stage.run(5.0)
-    assert stage.said() == ["armed", "adopted", "condition_true"]
+    assert stage.said() == ["armed", "condition_true", "do", "done"]
     assert stage.core() == "Metronome"
     stage.run(1.0, playing=True)
-    assert stage.said()[3:] == ["condition_false", "undo", "done"]
+    assert stage.said()[4:] == ["condition_false", "undo", "done"]
     assert stage.core() == "Accelerando"
 
 
-@pytest.mark.parametrize("stage", [OF_THE_FILE], indirect=True)
-def test_what_the_file_put_in_is_not_undone(stage: Stage):
+@pytest.mark.parametrize("stage", [OF_THE_FILE | {"undo": ""}], indirect=True)
+def test_what_the_file_put_in_stays(stage: Stage):
     stage.run(5.0)
-    assert stage.said() == ["armed", "condition_true", "suppressed"]
     stage.run(2.0, playing=True)
-    assert stage.said()[3:] == ["condition_false"]
+    assert stage.said() == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
     assert stage.core() == "Metronome"
 
 

@@ -154,7 +154,7 @@ def test_a_success_that_the_state_contradicts_is_a_failure():
     outcome = Outcome(code=Code.OK, message="", revision=world.revision)
     world.engine.on_outcome(world.now_ns, world.requests[0].request_id, outcome)
     assert world.said()[-1] == "failed"
-    assert USUAL in world.decisions[-1].reason
+    assert "~/state shows that it is not active" in world.decisions[-1].reason
 
 
 def test_a_state_that_comes_after_the_answer_confirms_it():
@@ -164,7 +164,8 @@ def test_a_state_that_comes_after_the_answer_confirms_it():
     outcome = Outcome(code=Code.OK, message="", revision=world.revision + 1)
     world.engine.on_outcome(world.now_ns, world.requests[0].request_id, outcome)
     assert world.said()[-1] == "do"
-    world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    world.take(world.requests[0])
+    world.tell()
     assert world.said()[-1] == "done"
 
 
@@ -181,46 +182,136 @@ def test_a_wrong_revision_is_tried_again_soon_but_with_the_new_state_only():
     assert world.requests[1].expected_revision == 7
 
 
-@pytest.mark.parametrize("author", ["rule another", "operator"])
-def test_what_is_done_already_is_not_done_again_and_undone_where_a_rule_did_it(author: str):
+@pytest.mark.parametrize(("author", "after"), [("operator", LOCAL), ("fallback", USUAL)])
+def test_what_is_done_already_is_held_and_at_the_end_a_person_s_choice_stays(author: str, after: str):
     world = started()
     world.tell({"exploration": ComponentView("RUNNING", LOCAL, {"core": author})})
     world.talking = False
     world.run(2.0)
-    assert world.requests == []
-    assert world.said() == ["armed", "condition_true", "suppressed"]
-    assert "already" in world.decisions[-1].reason
+    assert world.asked() == ["set link_lost"]
+    assert world.said() == ["armed", "condition_true", "do", "done"]
     world.talking = True
     world.run(4.0)
-    assert world.cores() == ([USUAL] if author == "rule another" else [])
+    assert world.asked() == ["set link_lost", "release link_lost"]
+    assert world.components["exploration"].core == after
 
 
-def test_a_person_who_swaps_back_by_hand_is_left_alone_until_the_condition_ends():
+def test_what_another_rule_did_stays_as_long_as_that_is_active():
+    another = rule("another")
+    world = started()
+    world.set_already(another)
+    world.tell()
+    world.talking = False
+    world.run(2.0)
+    world.talking = True
+    world.run(4.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
+    assert world.components["exploration"].core == LOCAL
+    world.drop("another")
+    assert world.components["exploration"].core == USUAL
+    assert "adopted" not in world.said(), "another is no rule of this supervisor"
+
+
+def test_the_end_of_a_rule_without_steps_gives_back_what_was_there_before():
+    world = started(rule(undo=[]))
+    world.tell({"exploration": ComponentView("RUNNING", "mauve_examples/Hovering")})
+    world.talking = False
+    world.run(2.0)
+    assert world.components["exploration"].core == LOCAL
+    world.talking = True
+    world.run(4.0)
+    assert [(each.release, each.steps == ()) for each in world.requests] == [(False, False), (True, True)]
+    assert world.components["exploration"].core == "mauve_examples/Hovering"
+    assert world.said()[-2:] == ["undo", "done"]
+
+
+def test_a_rule_is_set_again_when_the_state_no_longer_names_it_active():
     world = started()
     world.talking = False
     world.run(1.5)
-    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
-    assert world.said()[-1] == "suppressed"
-    assert "by another requester" in world.decisions[-1].reason
+    world.drop("link_lost")
+    assert world.components["exploration"].core == USUAL
+    world.tell()
+    world.run(0.1)
+    assert world.asked() == ["set link_lost", "set link_lost"]
+    assert world.said()[-2:] == ["do", "done"]
+    assert world.components["exploration"].core == LOCAL
     world.run(5.0)
     world.talking = True
     world.run(4.0)
-    assert world.cores() == [LOCAL]
+    assert world.asked() == ["set link_lost", "set link_lost", "release link_lost"]
+    assert world.components["exploration"].core == USUAL
+
+
+def test_a_rule_that_the_state_no_longer_names_active_is_not_set_again_once_its_condition_has_ended():
+    world = started()
+    world.talking = False
+    world.run(1.5)
+    world.talking = True
+    world.run(4.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
+    world.tell()
+    world.run(4.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
+
+
+def test_a_person_who_swaps_back_by_hand_is_left_alone_while_the_state_names_the_rule_active():
+    world = started()
+    world.talking = False
+    world.run(1.5)
+    said = world.said()
+    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
+    world.run(5.0)
+    assert world.asked() == ["set link_lost"]
+    assert world.said() == said
+    world.talking = True
+    world.run(4.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
     world.talking = False
     world.run(2.0)
-    assert world.cores() == [LOCAL, LOCAL]
+    assert world.cores() == [LOCAL, USUAL, LOCAL]
 
 
-def test_without_undo_the_next_silence_is_acted_on_again():
+def test_without_undo_what_it_did_stays_and_the_next_silence_is_acted_on_again():
     world = started(rule(undo=False))
     world.talking = False
     world.run(1.5)
     world.talking = True
     world.run(1.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
+    assert world.requests[1].steps == world.requests[0].steps, "so that it stays"
+    assert world.components["exploration"].core == LOCAL
+    assert world.active == set()
+    assert world.said() == ["armed", "condition_true", "do", "done", "condition_false"]
     world.tell({"exploration": ComponentView("RUNNING", USUAL)})
     world.talking = False
     world.run(2.0)
-    assert world.cores() == [LOCAL, LOCAL]
+    assert world.asked() == ["set link_lost", "release link_lost", "set link_lost"]
+    assert world.components["exploration"].core == LOCAL
+
+
+def test_without_undo_what_somebody_else_has_ended_is_not_released():
+    world = started(rule(undo=False))
+    world.talking = False
+    world.run(1.5)
+    world.talking = True
+    world.hear()
+    world.drop("link_lost")
+    world.tell()
+    world.run(2.0)
+    assert world.asked() == ["set link_lost"]
+    assert world.said()[-1] == "condition_false"
+
+
+def test_without_undo_what_it_did_stays_even_where_a_person_chose_something_before():
+    world = started(rule(undo=False))
+    world.tell({"exploration": ComponentView("RUNNING", "mauve_examples/Hovering")})
+    world.talking = False
+    world.run(1.5)
+    world.talking = True
+    world.run(1.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
+    assert world.ran == [LOCAL]
 
 
 def test_one_action_at_a_time():
@@ -229,7 +320,8 @@ def test_one_action_at_a_time():
     world.run(2.0)
     assert [request.steps[0].target for request in world.requests] == ["exploration"]
     assert [d.rule for d in world.decisions if d.decision == "suppressed"] == ["two"]
-    world.tell({"exploration": ComponentView("RUNNING", LOCAL)})
+    world.take(world.requests[0])
+    world.tell()
     world.answering = True
     world.engine.on_outcome(
         world.now_ns,
@@ -238,6 +330,7 @@ def test_one_action_at_a_time():
     )
     world.run(0.1)
     assert [request.steps[0].target for request in world.requests] == ["exploration", "mapping"]
+    assert [d.rule for d in world.decisions if d.decision == "done"] == ["one", "two"]
 
 
 def test_a_target_that_faults_disarms():
@@ -259,42 +352,61 @@ def test_an_executor_started_anew_is_a_new_story():
     world = started()
     world.talking = False
     world.run(1.5)
-    world.instance_id = "second"
-    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
+    world.restart()
     assert world.said()[-1] == "armed"
     world.run(1.5)
     assert world.cores() == [LOCAL, LOCAL]
+
+
+def test_what_an_executor_started_anew_names_active_is_adopted():
+    world = started()
+    world.talking = False
+    world.run(1.5)
+    world.instance_id = "second"  # it has kept what is active
+    world.tell()
+    assert world.said()[-2:] == ["armed", "adopted"]
+    world.run(3.0)
+    assert world.cores() == [LOCAL]
+    world.talking = True
+    world.run(4.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
 
 
 def test_an_executor_that_dies_with_an_action_in_flight():
     world = started()
     world.talking = world.answering = False
     world.run(1.5)
-    world.instance_id = "second"
     world.answering = True
-    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
+    world.restart()
     assert world.said()[-2:] == ["failed", "armed"]
     world.run(1.5)
     assert world.said()[-1] == "done"
 
 
-def after_a_restart(*rules: Rule, author: str = "rule link_lost", **world: object) -> World:
-    """A supervisor that starts when an executor runs the other core already, put in by `author`."""
+def after_a_restart(*rules: Rule, active: bool = True, **world: object) -> World:
+    """A supervisor that starts when an executor runs the other core already.
+
+    `active`: the supervisor before has set the rule; else a person has put the core in.
+    """
     later = World(list(rules) or [rule()], **world)  # type: ignore[arg-type]
     later.talking = False
-    authors = dict.fromkeys(("core", "property gain"), author) if author else {}
-    later.tell({"exploration": ComponentView("RUNNING", LOCAL, authors)})
+    if active:
+        later.set_already(later.rules[0])
+        later.tell()
+    else:
+        later.tell({"exploration": ComponentView("RUNNING", LOCAL)})
     return later
 
 
-@pytest.mark.parametrize("author", ["operator: faster", "", "fallback"])
+@pytest.mark.parametrize("author", ["operator: faster", "", "fallback", "rule link_lost"])
 @pytest.mark.parametrize("takes_over", [True, False])
-def test_what_an_operator_did_is_undone_only_where_the_rule_takes_it_over(author: str, *, takes_over: bool):
-    world = after_a_restart(rule(takes_over=takes_over), author=author)
-    world.talking = True  # the condition is false all along
-    world.run(8.0)
-    assert world.cores() == ([USUAL] if takes_over else [])
-    assert ("adopted" in world.said()) == takes_over
+def test_a_rule_that_is_not_active_is_not_adopted_whoever_did_what_it_does(author: str, *, takes_over: bool):
+    world = World([rule(takes_over=takes_over)])
+    authors = dict.fromkeys(("core", "property gain"), author) if author else {}
+    world.tell({"exploration": ComponentView("RUNNING", LOCAL, authors)})
+    world.run(8.0)  # the condition is false all along
+    assert world.requests == []
+    assert world.said() == ["armed"]
 
 
 def test_what_a_rule_asks_for_names_the_rule():
@@ -335,29 +447,80 @@ def test_an_undo_that_dwells_shorter_than_the_silence_lasts_does_not_flap_after_
     assert world.cores() == [USUAL]
 
 
-def test_what_has_no_undo_or_is_undone_already_is_not_adopted():
-    assert after_a_restart(rule(undo=False)).said() == ["armed"]
-    assert after_a_restart(rule(usual=LOCAL)).said() == ["armed"]
+def test_what_has_no_undo_is_adopted_and_released_when_the_link_is_back():
+    world = after_a_restart(rule(undo=False))
+    assert world.said() == ["armed", "adopted"]
+    world.run(5.0)
+    assert world.requests == []  # nobody was heard yet: the link may still be lost
+    world.talking = True
+    world.run(1.0)
+    assert world.asked() == ["release link_lost"]
+    assert world.requests[0].steps == tuple(world.rules[0].do)
+    assert world.components["exploration"].core == LOCAL
+    assert not {"undo", "done"} & {*world.said()}
 
 
-def test_what_only_the_list_of_components_shows_is_adopted():
+def test_what_is_active_is_adopted_even_where_its_undo_is_so_already():
+    world = after_a_restart(rule(usual=LOCAL))
+    assert world.said() == ["armed", "adopted"]
+    world.talking = True
+    world.run(4.0)
+    assert world.asked() == ["release link_lost"]
+    assert world.active == set()
+
+
+def test_what_this_supervisor_has_set_is_not_adopted():
+    world = started()
+    world.talking = False
+    world.run(1.5)
+    for _ in range(3):
+        world.tell()
+        world.run(0.5)
+    assert world.said() == ["armed", "condition_true", "do", "done"]
+
+
+def test_what_was_carried_out_without_an_answer_is_adopted_and_released():
+    world = started()
+    world.talking = world.answering = False
+    world.run(6.3)
+    assert "no answer within 5 s" in world.decisions[-1].reason
+    world.take(world.requests[0])
+    world.tell()
+    assert world.said()[-1] == "adopted"
+    world.answering = world.talking = True
+    world.run(4.0)
+    assert world.asked() == ["set link_lost", "release link_lost"]
+    assert world.active == set()
+
+
+@pytest.mark.parametrize("is_active", [True, False])
+@pytest.mark.parametrize("shown", ["0.50", "0.51"])
+def test_what_the_list_shows_is_not_tried_and_no_reason_to_adopt(shown: str, *, is_active: bool):
     def gain(value: float) -> dict[str, object]:
         return {"kind": "set_property", "target": "exploration", "name": "gain", "value": value}
 
     careful = rule(do=[gain(0.5)], undo=[gain(2.0)])
-    assert after_a_restart(careful, properties={"gain": "0.50"}).said() == ["armed", "adopted"]
-    assert after_a_restart(careful, properties={"gain": "0.51"}).said() == ["armed"]
+    world = after_a_restart(careful, active=is_active, properties={"gain": shown})
+    assert world.said() == ["armed", "adopted"] if is_active else ["armed"]
+    world.talking = True
+    world.run(0.5)
+    tried = [[float(step.value) for step in trial.steps] for trial in world.trials]
+    if is_active:
+        assert tried == [[2.0]]
+    else:
+        assert tried == ([[0.5, 2.0]] if shown == "0.50" else [[0.5], [0.5, 2.0]])
 
 
 def test_a_list_that_comes_late_is_asked_for_again_and_one_of_another_start_is_ignored():
     world = after_a_restart(listing=False)
+    assert world.said() == ["armed", "adopted"], "that does not wait for the list"
     other = Inventory("zeroth", {"exploration": ListedComponent(state="RUNNING", core=LOCAL)})
     world.engine.on_inventory(world.now_ns, other)
     world.run(0.5)
-    assert world.said() == ["armed"]
+    assert world.trials == []
     world.listing = True
     world.run(1.1)
-    assert world.said()[1] == "adopted"
+    assert [[step.name for step in trial.steps] for trial in world.trials] == [[USUAL]]
 
 
 def test_a_person_s_swap_while_the_supervisor_runs_is_not_adopted():
@@ -373,8 +536,7 @@ def test_a_person_s_swap_while_the_supervisor_runs_is_not_adopted():
 
 def test_an_executor_started_anew_in_its_first_state_owes_the_rule_nothing():
     world = after_a_restart()
-    world.instance_id = "second"
-    world.tell({"exploration": ComponentView("RUNNING", USUAL)})
+    world.restart()
     world.talking = True
     world.run(5.0)
     assert world.requests == []
@@ -446,16 +608,14 @@ def test_a_rule_that_the_executor_runs_is_left_to_it_and_taken_over_when_it_does
     assert "left to it" in world.decisions[0].reason
     assert world.requests == []
     world.own_rules = frozenset()
-    world.components = {
-        name: type(view)(view.state, LOCAL, {"core": "rule link_lost"})
-        for name, view in world.components.items()
-    }
+    world.set_already(world.rules[0])
     world.tell()
     world.run(0.5)
     assert [each.decision for each in world.decisions][1:] == ["armed", "adopted", "condition_true"]
     world.talking = True
     world.run(1.0)
-    assert world.requests[-1].steps[0].name == USUAL
+    assert world.asked() == ["release link_lost"]
+    assert world.components["exploration"].core == USUAL
 
 
 def test_what_only_the_executor_hears_is_not_taken_over():

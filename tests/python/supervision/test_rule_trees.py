@@ -73,10 +73,7 @@ def test_what_held_a_while_ago():
 
 def test_a_tree_that_did_before_a_restart_holds_until_it_is_heard_otherwise():
     world = World([rule(when={"any": [silence("a"), silence("b")]}, undo_for_s=0.5)])
-    world.components = {
-        name: type(view)(view.state, LOCAL, {"core": "rule link_lost"})
-        for name, view in world.components.items()
-    }
+    world.set_already(world.rules[0])
     world.talking = False
     world.tell()
     world.run(3.0)
@@ -116,28 +113,51 @@ def rivals(*quiet: str) -> World:
     return world
 
 
-def test_of_two_that_hold_the_higher_decides_and_the_lower_says_so_once():
+def outranked(world: World) -> list[tuple[str, str]]:
+    told = [each for each in world.decisions if "outranked" in each.reason]
+    assert {each.decision for each in told} <= {"suppressed"}
+    return [(each.rule, each.reason) for each in told]
+
+
+LOWER_IS_OUTRANKED = ("lower", "no do: outranked by rule higher (priority 5)")
+
+
+def test_of_two_that_hold_both_are_set_the_higher_first_and_it_decides():
     world = rivals("a", "b")
     world.run(10.0)
-    assert done(world) == ["higher"]
-    lost = [each.reason for each in world.decisions if (each.rule, each.decision) == ("lower", "suppressed")]
-    assert lost == ["no do: outranked by rule higher (priority 5)"]
+    assert world.asked() == ["set higher", "set lower"]
+    assert [request.priority for request in world.requests] == [5, 0]
+    assert done(world) == ["higher", "lower"]
+    assert world.active == {"higher", "lower"}
+    assert world.ran == [OTHER], "the lower one's core never runs"
 
 
-def test_the_lower_acts_again_once_the_higher_has_been_undone():
+def test_the_lower_says_once_that_a_higher_one_has_come():
+    world = rivals("a")
+    world.run(3.0)
+    assert outranked(world) == []
+    world.quiet = {"a", "b"}
+    world.run(10.0)
+    assert outranked(world) == [LOWER_IS_OUTRANKED]
+
+
+def test_from_the_higher_one_s_end_the_lower_one_s_is_in_force_at_once():
     world = rivals("a")
     world.run(3.0)
     assert done(world) == ["lower"]
     world.quiet = {"a", "b"}
     world.run(3.0)
     assert done(world) == ["lower", "higher"]
+    assert world.active == {"higher", "lower"}
     world.quiet = {"a"}
     world.run(3.0)
-    assert done(world) == ["lower", "higher", "higher", "lower"]
+    assert world.asked() == ["set lower", "set higher", "release higher"], "the lower one is active all along"
+    assert done(world) == ["lower", "higher", "higher"]
     assert world.components["exploration"].core == LOCAL
     world.quiet = set()
     world.run(3.0)
-    assert world.components["exploration"].core == USUAL
+    assert world.asked()[3:] == ["release lower"]
+    assert world.ran == [LOCAL, OTHER, LOCAL, USUAL], "the base did not run between the two"
 
 
 def test_a_lower_one_that_ends_meanwhile_does_not_undo_what_the_higher_did():
@@ -147,8 +167,13 @@ def test_a_lower_one_that_ends_meanwhile_does_not_undo_what_the_higher_did():
     world.run(3.0)
     world.quiet = {"b"}
     world.run(5.0)
-    assert world.components["exploration"].core == OTHER
-    assert len(world.requests) == 2
+    assert world.asked() == ["set lower", "set higher", "release lower"]
+    assert world.active == {"higher"}
+    assert world.ran == [LOCAL, OTHER]
+    world.quiet = set()
+    world.run(3.0)
+    assert world.asked()[3:] == ["release higher"]
+    assert world.ran == [LOCAL, OTHER, USUAL]
 
 
 def test_a_higher_one_that_fails_does_not_keep_the_lower_from_acting():
@@ -157,6 +182,7 @@ def test_a_higher_one_that_fails_does_not_keep_the_lower_from_acting():
     world.run(3.0)
     assert [request.steps[0].name for request in world.requests] == [OTHER, LOCAL, OTHER]
     assert done(world) == ["lower", "higher"]
+    assert world.ran == [LOCAL, OTHER]
 
 
 def test_rules_of_one_mind_do_not_wait_for_one_another():

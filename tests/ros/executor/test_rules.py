@@ -21,7 +21,7 @@ from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
-from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore, Stop
+from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore, ResetRule, Stop
 from mauve_msgs.srv import Start as StartComponent
 from mauve_rt.control.requests import Code
 
@@ -194,7 +194,7 @@ def test_acts_while_a_component_in_python_keeps_the_interpreter(start: Start, gr
     )
     assert reply.success, reply.message
     os.mkfifo(pipe := tmp_path / "pipe")
-    keeping = keep_interpreter(robot.process, pipe)
+    keeping = keep_interpreter(robot.process, str(pipe))
     try:
         graph.spin_until(lambda: keeping.read_text() == "keeping", "the interpreter to be kept")
         robot.voice.off()
@@ -288,6 +288,53 @@ def test_a_stop_that_lasts_is_not_undone_by_new_rules_or_activations(
     robot.await_said("armed", 5)
     assert stays_pressed(robot, graph)
     press(0.0)
+    robot.await_core(USUAL)
+
+
+SAFETY = STOP.replace("name: quiet", "name: quiet\n    safety: true\n    latch: true\n    otherwise: stop")
+OTHERS = f"""\
+mauve: 1
+rules:
+  - name: other
+    when: {{silence: {{topic: beat, longer_than_s: 1000.0}}}}
+    do: [{{kind: replace_core, target: counter, name: {SAFE}}}]
+"""
+
+
+def test_an_active_safety_rule_is_let_go_by_name_only(start: Start, graph: Any, files: tuple[Path, Path]):
+    files[1].write_text(SAFETY, encoding="utf-8")
+    robot = start()
+    press = pressed(robot, graph)
+    files[1].write_text(OTHERS, encoding="utf-8")
+    reply = graph.ask(LoadRules, f"{NODE}/load_rules", path="")
+    assert (reply.success, reply.code) == (False, Code.ACTIVE_SAFETY_RULE)
+    assert "--release quiet" in reply.message
+    assert robot.core() == SAFE
+    press(0.0)
+    assert stays_pressed(robot, graph), "it is latched"
+    by_hand = {"component": "counter", "core": USUAL, "requested_by": "operator"}
+    reply = graph.ask(ReplaceCore, f"{NODE}/replace_core", over="rules", **by_hand)
+    assert (reply.success, reply.code) == (False, Code.HELD_BY_RULE)
+    assert "--over-rules quiet" in reply.message
+    assert graph.ask(LoadRules, f"{NODE}/load_rules", path="", release=["quiet"]).success
+    robot.await_core(USUAL)
+
+
+def test_a_latched_rule_ends_by_a_reset_once_its_cause_is_gone(
+    start: Start, graph: Any, files: tuple[Path, Path]
+):
+    files[1].write_text(SAFETY, encoding="utf-8")
+    robot = start()
+    press = pressed(robot, graph)
+    graph.spin_until(lambda: robot.states[-1].active_rules == ["quiet"], "~/state to name the rule")
+    (held,) = robot.states[-1].held
+    assert (held.target, held.element, held.holder) == ("counter", "core", "rule quiet")
+    assert (USUAL in held.base, SAFE in held.wanted) == (True, True)
+    refused = graph.ask(ResetRule, f"{NODE}/reset_rule", rule="quiet")
+    assert (refused.success, refused.code) == (False, Code.CONDITION_NOT_FALSE)
+    press(0.0)
+    robot.await_said("condition_false")
+    assert graph.ask(ResetRule, f"{NODE}/reset_rule", rule="quiet").success
     robot.await_core(USUAL)
 
 

@@ -55,6 +55,7 @@ class StandIn:
         self.talking = True
         self.number = 0
         self.core = USUAL
+        self.active: set[str] = set()  # rules
         self.revision = 0
         self.node = Node("executor", namespace="/robot_1", context=context)
         latched = QoSProfile(depth=1, durability=LATCHED)
@@ -66,7 +67,9 @@ class StandIn:
     def tell(self) -> None:
         self.revision += 1
         status = ComponentStatus(name="exploration", state=ComponentInfo.RUNNING, core=self.core)
-        self._state.publish(ArchitectureState(instance_id="one", revision=self.revision, components=[status]))
+        state = ArchitectureState(instance_id="one", revision=self.revision, components=[status])
+        state.active_rules = sorted(self.active)
+        self._state.publish(state)
 
     def _speak(self) -> None:
         if self.talking:
@@ -78,6 +81,7 @@ class StandIn:
             response.code, self.refuse_with = self.refuse_with, 0
             response.message = "refused for the test"
         else:
+            (self.active.discard if request.release else self.active.add)(request.rule)
             self.core = request.steps[0].name
             self.tell()
             response.success = True
@@ -272,14 +276,16 @@ def test_a_refusal_is_told_and_tried_again(graph: Graph, rules: Path):
     assert decisions[3].message == "refused for the test"
 
 
-def test_who_swapped_by_hand_before_is_not_swapped_again(graph: Graph, rules: Path):
+def test_who_swapped_by_hand_before_is_told_that_the_rule_is_active(graph: Graph, rules: Path):
+    """The executor finds that nothing is to be done; and gives back what was chosen by hand."""
     stand_in, decisions = supervised(graph, rules)
     stand_in.core = LOCAL
     stand_in.tell()
     stand_in.talking = False
-    graph.until(lambda: len(decisions) >= 3)
-    assert said(decisions) == ["armed", "condition_true", "suppressed"]
-    assert stand_in.requests == []
+    graph.until(lambda: len(decisions) >= 4)
+    assert said(decisions) == ["armed", "condition_true", "do", "done"]
+    (request,) = stand_in.requests
+    assert (request.rule, request.release, request.priority) == ("link_lost", False, 0)
 
 
 def test_an_executor_that_is_gone_is_a_failure_that_is_told(graph: Graph, rules: Path):

@@ -77,6 +77,7 @@ class RuleHistory {
     std::optional<rules::Act> under_way{};  // do or undo
     bool is_in_reserve{false};
     bool is_armed{false};
+    bool is_adopted{true};  // it may have been active before
     time_ns_t stamp_ns{0};
     time_ns_t begun_ns{0};
   };
@@ -88,6 +89,7 @@ class RuleHistory {
     using rules::Decided;
     const rules::Decision& decision = told.decision;
     const auto index = static_cast<std::size_t>(decision.rule);
+    if (index >= rules_.size()) return;  // of the set before, which is undone
     const KnownRule& known = rules_[index];
     Life& life = lives[index];
     const std::string what = known.rule.name + ", decision " + std::to_string(told.number) + " (" +
@@ -112,7 +114,11 @@ class RuleHistory {
                  what + "the action of " + rules_[k].rule.name + " about the same is under way");
         life.under_way = decision.act;
         life.begun_ns = decision.stamp_ns;
-        check_cause(decision, known, what);
+        if (!life.is_adopted) check_cause(decision, known, what);
+        if (decision.act == Act::undo) life.is_adopted = false;
+        break;
+      case Decided::condition_true:
+        life.is_adopted = false;
         break;
       case Decided::otherwise:
         life.is_in_reserve = true;
@@ -143,7 +149,9 @@ class RuleHistory {
            what + "after " + std::to_string(decision.stamp_ns - decision.cause_ns) + " ns, expected " +
                std::to_string(dwell_ns));
     const std::vector<Beat>& beats = beats_[known.beat];
-    const time_ns_t slack_ns = kSeen + seeds::outcome().stalled_ns;
+    // It is wanted for so long after its condition has ended, whenever it becomes ready.
+    const time_ns_t still_wanted_ns = does ? known.rule.undo_for_ns : known.rule.for_ns;
+    const time_ns_t slack_ns = kSeen + seeds::outcome().stalled_ns + still_wanted_ns + known.rule.cooldown_ns;
     bool was_so = false;
     for (std::size_t i = 0; i < beats.size(); ++i) {
       const time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns + slack_ns : kForever;

@@ -35,6 +35,8 @@ TransactionStep::TransactionStep(const StepKind& its_kind, std::string its_targe
   if (const std::string words = its_kind.words(*this); !words.empty()) text_ += " " + words;
 }
 
+std::string_view TransactionStep::kind() const noexcept { return kind_.name; }
+
 const std::string& TransactionStep::component() const noexcept {
   static const std::string none;
   return kind_.target == StepTarget::component ? target : none;

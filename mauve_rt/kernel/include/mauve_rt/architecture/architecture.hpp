@@ -15,6 +15,7 @@
 #include "mauve_rt/architecture/description.hpp"
 #include "mauve_rt/architecture/keeper.hpp"
 #include "mauve_rt/architecture/open_change.hpp"
+#include "mauve_rt/architecture/overlays.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
@@ -201,10 +202,14 @@ class Architecture final : public Configurable {
   /// Who changed what since the file or program made it. A core that runs after a fault as fallback is "fallback",
   /// one that a probation has put back "probation". [non-rt]
   std::vector<Authored> authors() const;
-  /// Notes the author of a change that was made without a transaction. [non-rt]
-  void note_author(const std::string& target, const std::string& element, const std::string& author);
+  /// Notes the author of a start or stop that was made without a transaction. [non-rt]
+  void note_author(const Assigned& assigned, const std::string& author);
   /// Notes the author of each step of a transaction that is in force. [non-rt]
   void note_authors(const Transaction& transaction);
+  /// What each element should be, by rules and persons. [non-rt]
+  Overlays& overlays() noexcept { return overlays_; }
+  /// The same: follows what has become of the architecture. `look`: before it was described. [non-rt]
+  void follow(const Overlays::Look& look, const ArchitectureDescription& description);
   /// Grows with every committed change and every start, stop and fault; never 0. [non-rt]
   std::uint64_t revision() const noexcept {
     return std::uint64_t{1} + changes_.word.load(std::memory_order_acquire);
@@ -359,6 +364,7 @@ class Architecture final : public Configurable {
   bool configure_hook() override;
   void check_cleanup() const override;
   void cleanup_hook() override;
+  void reject_core(const std::string& component, const std::string& core);
   bool end_threads() noexcept;
   void note_restructured() noexcept;
 
@@ -374,6 +380,7 @@ class Architecture final : public Configurable {
   Runner* host_ MAUVE_GUARDED_BY(host_mutex_){nullptr};
   ChangeSignal changes_;
   Authors authors_;
+  Overlays overlays_;
   Notifier publications_;
   Atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable Mutex list_mutex_;

@@ -78,6 +78,8 @@ class TransactionStep {
 
   /// "connect mapping.scan lidar.read": kind, target, value.
   const std::string& text() const noexcept { return text_; }
+  /// "connect".
+  std::string_view kind() const noexcept;
   /// The component it is about; empty for steps about resources.
   const std::string& component() const noexcept;
   /// Whether it has a report of every component that it touched.

@@ -339,6 +339,8 @@ class Component final : public Configurable {
   /// False when none is on probation, or it ends without that. From one of the component's own states it is pending by the
   /// return. [non-rt] Throws Error (timeout) naming the state still running; the request stays pending then.
   bool revert_probation(const std::string& reason, time_ns_t timeout_ns = s_to_ns(1));
+  /// The registered core that has faulted, whose place the fallback core has taken; empty: it has not. [non-rt]
+  std::string faulted_core() const;
   /// The last probation that was settled, then the present one, as far as there are. A new core is there once its change is
   /// completed. [non-rt]
   std::vector<ProbationRecord> probations() const;
@@ -459,7 +461,8 @@ class Component final : public Configurable {
 
   mutable Mutex shown_mutex_;
   ShownParts shown_ MAUVE_GUARDED_BY(shown_mutex_);
-  Atomic<std::uint32_t> core_name_{0};  // in the trace; set with the core, relaxed: a lone fact
+  Atomic<std::uint32_t> core_name_{0};     // in the trace; set with the core, relaxed: a lone fact
+  Atomic<std::uint32_t> faulted_core_{0};  // the same of the one that the fallback took the place of last
   std::shared_ptr<const StateTimes> shown_times_ MAUVE_GUARDED_BY(shown_mutex_);
   std::vector<DescribedState> shown_states_ MAUVE_GUARDED_BY(shown_mutex_);
   std::shared_ptr<Probation> probation_ MAUVE_GUARDED_BY(shown_mutex_);

@@ -17,35 +17,29 @@
 
 namespace mauve::rules {
 
-/// One step of a rule's transaction: all in names and plain values, so that it can be made again and again.
-struct ActionStep {
-  std::string kind{};  // as Transaction::add() takes it
-  std::string target{};
-  std::string name{};
-  std::optional<PropertyValue> value{};
-
-  bool operator==(const ActionStep&) const = default;
-};
+/// One step of a rule's transaction.
+using ActionStep = Assignment;
 using ActionSteps = std::vector<ActionStep>;
 
 /// The transaction of such steps, by a rule of that name. [non-rt] Throws Error: there is no such kind.
 Transaction make_transaction(const ActionSteps& steps, const std::string& rule = {});
 /// The author of what a rule does: Authored::author. [non-rt]
 std::string rule_author(const std::string& rule);
-/// Whether all that the steps ask for was done by rules. [non-rt]
-bool is_by_rules(const ActionSteps& steps, const std::vector<Authored>& authors);
-/// Which of the components of which they replace or set something is not there, or does not run, in words; empty: none. [non-rt]
+/// The steps with the elements that they set. [non-rt] Throws Error: there is no such kind.
+std::vector<Assigned> assigned(const ActionSteps& steps);
+/// Which of the components of which they replace or set something is not there, or does not run, in words; empty: none. One
+/// that they start or stop may be stopped. [non-rt]
 std::string hindrance(const ActionSteps& steps, const ArchitectureDescription& description);
-/// Whether all that the steps ask for is so; nothing: they leave nothing behind that a description tells. [non-rt]
-std::optional<bool> is_in_place(const ActionSteps& steps, const ArchitectureDescription& description);
 
 /// What came of an action that was begun.
 struct ActionReport {
+  ActionSteps steps{};                        // what was to be done
   std::optional<TransactionReport> report{};  // of one that is in force
   std::string failure{};                      // of one that is not: why, in words
 };
 
-/// One transaction of a rule, prepared anew for each time that it is carried out.
+/// One transaction of a rule, prepared anew for each time that it is carried out. Its steps are those that lead to what is
+/// wanted, which others have a say in (Overlays): who prepares it brings them along.
 ///
 /// "decision thread", "preparation thread", "commit thread": see RuleRunner. Steps that cannot be prepared (configure,
 /// resynchronise) are tried beforehand, and carried out by the preparation thread.
@@ -55,35 +49,38 @@ struct ActionReport {
 /// | stage_    | decision thread: ready -> begun, over -> heard; who carries it out: begun -> over; preparation thread: the others | all | acq_rel: whose turn it is, and hands over prepared_ and how_ |
 /// | prepared_ | preparation thread; commit thread while begun                | decision thread while begun | by stage_ |
 /// | how_      | who carries it out                                           | decision thread | by stage_ |
+/// | based_on_ | preparation thread                                           | decision thread | release/acquire: the steps are of then or later |
 /// | the rest  | preparation thread                                           | preparation thread | -      |
 class Action {
  public:
-  /// No steps: the rule has no such action. [setup]
-  explicit Action(ActionSteps steps = {}, const TransactionOptions& options = {}, std::string rule = {});
+  /// [setup]
+  Action(bool exists, const TransactionOptions& options, std::string rule);
   Action(const Action&) = delete;
   Action& operator=(const Action&) = delete;
 
-  /// [rt]
-  bool exists() const MAUVE_RT { return !steps_.empty(); }
-  /// [non-rt]
-  const ActionSteps& steps() const noexcept { return steps_; }
-  /// Whether a real-time thread commits it; else the preparation thread carries it out. [rt]
+  /// Whether the rule has such an action. [rt]
+  bool exists() const MAUVE_RT { return exists_; }
+  /// Whether a real-time thread commits it, once it is ready; else the preparation thread carries it out. [rt]
   bool is_preparable() const MAUVE_RT { return is_preparable_; }
   /// Whether it was begun, and what came of it is not in the architecture's description yet. [rt]
   bool is_unsettled() const MAUVE_RT { return stage_.load(std::memory_order_acquire) > Stage::ready; }
 
   // ---- the preparation thread
 
-  /// Prepares it, where it is not prepared, or was before something changed; whether that changed anything. [non-rt]
-  bool prepare(Host& host, std::uint64_t revision);
-  /// Finds out whether it could be prepared once `before` is done. [non-rt]
-  void try_after(const ActionSteps& before, Host& host);
+  /// Whether it is not prepared, or was before something changed. [non-rt]
+  bool is_wanting(std::uint64_t revision, std::uint32_t based_on) const;
+  /// Prepares it anew; no steps: nothing is to be done. Whether it was or is ready. [non-rt]
+  bool prepare(Host& host, std::uint64_t revision, ActionSteps steps, std::uint32_t based_on);
+  /// Finds out whether the steps could be prepared once `before` is done. [non-rt]
+  void try_after(const ActionSteps& before, const ActionSteps& steps, Host& host);
   /// It is not to be wanted now; whether it was ready. [non-rt]
   bool put_away();
   /// Completes what was committed; carries out what was begun and cannot be prepared: whether there was such a thing. [non-rt]
   bool settle(Host& host);
   /// What came of it, once, after settle(); waits for the releases that follow. [non-rt]
   std::optional<ActionReport> report();
+  /// Whether there was nothing to prepare, as all is so. [non-rt]
+  bool has_no_steps() const noexcept { return tried_at_ != 0 && steps_.empty(); }
   /// Why it could not be prepared; empty: it could be, or that was not tried. [non-rt]
   const std::string& problem() const noexcept { return problem_; }
   /// What is kept prepared. [non-rt]
@@ -91,8 +88,11 @@ class Action {
 
   // ---- the decision thread
 
-  /// Whether it could begin. [rt]
-  bool is_ready() const MAUVE_RT { return stage_.load(std::memory_order_acquire) == Stage::ready; }
+  /// Whether it could begin, with steps of this number or later. [rt]
+  bool is_ready(std::uint32_t based_on) const MAUVE_RT {
+    return stage_.load(std::memory_order_acquire) == Stage::ready &&
+           based_on_.load(std::memory_order_acquire) == based_on;
+  }
   /// Posts it to who carries it out; false: it was not ready any more. [rt]
   bool begin() MAUVE_RT;
   /// Lets a commit under way end soon, without the change where that is not made. [rt]
@@ -108,20 +108,21 @@ class Action {
  private:
   enum class Stage : std::uint8_t { idle, ready, begun, over, heard };
 
-  bool is_wanting(std::uint64_t revision) const;
   void complete();
   void carry_out(Host& host);
 
-  const ActionSteps steps_;
+  const bool exists_;
   const TransactionOptions options_;
   const std::string rule_;
-  const bool is_preparable_;
+  ActionSteps steps_;
+  bool is_preparable_{true};  // by stage_, as prepared_
   std::unique_ptr<PreparedTransaction> prepared_;
   std::unique_ptr<TransactionCommit> committed_;
   std::optional<ActionReport> report_;
   std::string problem_;
   std::uint64_t tried_at_{0};  // the revision; 0: not yet
   Ended how_{Ended::done};
+  Atomic<std::uint32_t> based_on_{0};
   Atomic<Stage> stage_{Stage::idle};
 };
 

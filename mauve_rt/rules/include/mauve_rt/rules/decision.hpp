@@ -40,7 +40,7 @@ enum class Decided : std::uint8_t {
 enum class Why : std::uint8_t {
   none,
   already,             // it is in effect without it
-  changed_by_another,  // somebody else changed what it did: left alone until the condition ends
+  changed_by_another,  // in older bags: somebody else had changed what it did
   cooldown,            // for wait_ns more
   outranked,           // by a rule of a higher priority that is about the same components: other
   in_flight,           // another rule's action is: other

@@ -23,14 +23,16 @@ struct Rule {
   std::string name{};
   When when{};
   time_ns_t for_ns{0};       // the condition must have held so long before `do`
-  bool undoes{false};        // else it is over when the condition ends
+  bool undoes{false};        // else what it did stays
   time_ns_t undo_for_ns{0};  // and not held so long before `undo`
   time_ns_t cooldown_ns{0};  // from the end of an action to the next one of the rule
   std::int64_t priority{0};  // of several that are about the same, the highest decides; then the first
   std::vector<std::string> about{};  // components that it changes
   std::optional<time_ns_t>
       otherwise_after_ns{};  // so long after `do` is due, and not in effect: its reserve action
-  bool takes_over{false};    // what it does counts as its own, and is undone, also where somebody else did it
+  bool safety{false};        // above all that are not
+  bool latch{false};         // it ends by reset() only
+  bool is_released{false};   // it ends at once: its file no longer has it
 
   bool operator==(const Rule&) const = default;
 };
@@ -50,9 +52,10 @@ enum class Ended : std::uint8_t { done, refused, stale, withdrawn, timed_out };
 struct RuleStatus {
   bool armed{false};
   Truth truth{Truth::unknown};
-  bool in_effect{false};
-  bool changed_by_another{false};
-  time_ns_t since_ns{0};  // the condition has been as it is
+  bool active{false};      // what it does is wanted
+  bool in_effect{false};   // and done, not undone yet
+  bool is_at_work{false};  // active, or something is left to be undone or under way
+  time_ns_t since_ns{0};   // the condition has been as it is
   double measured{0.0};
   std::optional<Act> next{};    // what it is going to want if nothing changes
   time_ns_t next_ns{kForever};  // when
@@ -65,12 +68,13 @@ struct RuleStatus {
 
 /// The rules of one architecture: no thread in it, no clock, and nothing allocated after it was made.
 ///
-/// A rule does (`do`) once its condition has held for `for_ns`, and undoes (`undo`) once it has not held for `undo_for_ns`.
-/// While the condition is unknown it begins neither: what was due is still done, what is in effect stays. Both times count
-/// anew from the end of that.
-/// It never fights a person: what it wants and finds already done is not done again, and what somebody changes while it is
-/// in effect stays as it is until the condition ends. Actions of rules about different components are under way side by
-/// side. Of rules about the same component one action at a time is: a rule of higher rank has that of a lower one called off.
+/// A rule is active once its condition has held for `for_ns`, until it has not held for `undo_for_ns`, but no earlier than
+/// `cooldown_ns` after its last action. Both times count anew from the end of a time at which the condition is unknown, which
+/// changes nothing. What an active rule wants is done (`do`), what one wanted that no longer is is undone: what that comes to
+/// besides other rules and persons is found out by who hosts it (Overlays).
+///
+/// Actions of rules about different components are under way side by side. Of rules about the same component one action at a
+/// time is: a rule of higher rank has that of a lower one called off.
 ///
 /// Whoever hosts it calls step() at the instant that the step before returned, and when word() has changed; carries out
 /// pending(), then steps again, until nothing is pending; calls off what gives_way(); and tells what it finds of the architecture. All of that on one thread, the "decision thread".
@@ -120,16 +124,14 @@ class Engine {
   void set_present(std::size_t rule, bool present, time_ns_t now_ns) MAUVE_RT;
   /// All rules are present. [rt]
   void arm(time_ns_t now_ns) MAUVE_RT;
-  /// Whether what the act would do is in effect now. [rt]
-  void set_in_place(std::size_t rule, Act act, bool in_place, time_ns_t now_ns) MAUVE_RT;
-  /// Whether what its `do` would do is in effect by a rule; it is until the opposite is said. What somebody else did is not
-  /// undone, unless the rule takes it over. [rt]
-  void set_own(std::size_t rule, bool is_own) MAUVE_RT;
+  /// Whether nothing is left to be done by the act now. [rt]
+  void set_in_place(std::size_t rule, Act act, bool in_place) MAUVE_RT;
   /// Whether the act could begin at once; it can until the opposite is said. [rt]
   void set_ready(std::size_t rule, Act act, bool ready) MAUVE_RT;
-  /// What the rule does is in effect already, by a rule before: it is undone when it is time. [rt] Nothing happens
-  /// where somebody else did it, and the rule does not take over.
-  void adopt(std::size_t rule, time_ns_t now_ns) MAUVE_RT;
+  /// The rule is active since before this engine; or what it did is not undone yet. [rt]
+  void adopt(std::size_t rule, bool is_active, time_ns_t now_ns) MAUVE_RT;
+  /// Ends an active rule whose condition is false, be it latched; false: it is not so. [rt]
+  bool reset(std::size_t rule, time_ns_t now_ns) MAUVE_RT;
   /// The architecture is another one: nothing of before counts. [rt]
   void forget() MAUVE_RT;
   /// The same of one rule, that somebody else is to run: it watches no longer. [rt]
@@ -148,8 +150,7 @@ class Engine {
   /// The rule's `do` or `undo` that is under way, which is to be called off: a rule of higher rank, or its own reserve action,
   /// comes before it. [rt]
   std::optional<Act> gives_way(std::size_t rule) const MAUVE_RT;
-  /// Whether its next action may be prepared now: that claims components, so it keeps another rule's action, under way or
-  /// about to begin, from being committed. [rt]
+  /// Whether its next action may be prepared now: no action about its components is under way. [rt]
   bool may_prepare(std::size_t rule) const MAUVE_RT;
   /// Whether the two are about one component. [rt]
   bool contend(std::size_t one, std::size_t other) const MAUVE_RT;
@@ -162,6 +163,7 @@ class Engine {
   std::uint64_t lost() const MAUVE_RT { return lost_.load(std::memory_order_relaxed); }
   /// The decision thread. [rt]
   RuleStatus status(std::size_t rule) const MAUVE_RT;
+  bool is_active(std::size_t rule) const MAUVE_RT;
   std::size_t size() const MAUVE_RT { return lives_.size(); }
   /// [rt]
   const Rule& rule(std::size_t rule) const MAUVE_RT;
@@ -172,7 +174,9 @@ class Engine {
   static constexpr std::size_t kNone = SIZE_MAX;
 
   void look(Life& life, time_ns_t now_ns) noexcept;
-  std::optional<Act> wanted(Life& life, time_ns_t now_ns) noexcept;
+  void turn_after_cooldown(Life& life, time_ns_t now_ns) noexcept;
+  void turn(Life& life, time_ns_t now_ns) noexcept;
+  void forget_found_beside(const Life& life) noexcept;
   time_ns_t next_look(const Life& life, time_ns_t now_ns) const noexcept;
   void consider(Life& life, Act act, time_ns_t now_ns) noexcept;
   void otherwise_ended(Life& life, Ended how, time_ns_t now_ns) noexcept;

@@ -26,8 +26,11 @@ namespace mauve::rules {
 struct RuleActions {
   ActionSteps do_steps{};
   TransactionOptions do_options{};
-  ActionSteps undo_steps{};  // none: it does not undo
+  ActionSteps
+      undo_steps{};  // of a rule that undoes: what becomes the base at its end; else that is what was there before
   TransactionOptions undo_options{};
+  bool takes_over{false};  // ... also where a person gave it
+  bool whole{false};       // it does nothing while a person or a rule of higher rank has taken a part of it
   ReserveKind reserve{ReserveKind::stop};  // what its reserve action does, where the engine's rule has one
 };
 
@@ -73,15 +76,16 @@ struct RuleFacts {
 /// | Rule::hindrance   | follower        | facts()         | told_mutex_                                                 |
 /// | Rule::preparing_since_ns | preparation thread | facts() | relaxed: a lone instant                                  |
 /// | work_ (futex)     | anyone          | follower        | release/acquire: who sees the bump sees the work            |
+/// | Rule::reset (futex) | reset(), decision thread | both   | release/acquire: whose turn it is                           |
 /// | ending_ (futex)   | stop()          | decision thread, follower | release/acquire                                   |
 /// | told_ ... woken_, unobservable_ | follower, wake() | anyone | told_mutex_                                          |
 class RuleRunner {
  public:
-  /// `actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it. `before`: those of the same
+  /// `actions`: of the rules, in their order. What rules that are active now, and not among these, have done is undone. `topics`: topic -> the resource that is bound to it. `before`: those of the same
   /// host whose place these rules take, stopped: a rule that is in both, and the same, goes on, and what it receives in between
   /// counts. It is of no use afterwards, and as it was where this throws. [setup]
   /// Throws Error as Feeds::open(); invalid_argument: a rule that cannot be so, a kind of step that there is not.
-  RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, const std::vector<RuleActions>& actions,
+  RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, std::vector<RuleActions> actions,
              std::map<std::string, std::string> topics = {}, RuleRunner* before = nullptr);
   /// As stop().
   ~RuleRunner();
@@ -92,6 +96,9 @@ class RuleRunner {
   void start();
   /// Nothing is done any more on return; what is in effect stays so. May be called again. [non-rt]
   void stop() noexcept;
+
+  /// Ends an active rule whose condition is false, be it latched. Empty: done; else why not, in words. [non-rt]
+  std::string reset(const std::string& rule);
 
   /// Decisions not taken yet; waits for one, at most so long, or until wake(). [non-rt]
   std::vector<Told> wait_told(time_ns_t timeout_ns);
@@ -112,29 +119,41 @@ class RuleRunner {
   struct Kept {
     std::string problem{};
     std::size_t memory_bytes{0};
+    std::array<bool, 2> has_no_steps{};  // by Act: what it would bring about is so
     bool operator==(const Kept&) const = default;
   };
-  struct Rule {
-    Rule(const RuleActions& actions, const std::string& name_of_it, std::vector<std::string> about)
-        : acts{Action(actions.do_steps, actions.do_options, name_of_it),
-               Action(actions.undo_steps, actions.undo_options, name_of_it)},
-          reserve(actions.reserve, std::move(about)) {}
-    Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
+  static constexpr std::uint32_t kNoReset = 0;
+  static constexpr std::uint32_t kResetAsked = 1;
+  static constexpr std::uint32_t kIsReset = 2;
+  static constexpr std::uint32_t kResetRefused = 3;
 
-    std::array<Action, 2> acts;  // by Act
+  struct Rule {
+    Rule(const RuleActions& its_actions, const mauve::rules::Rule& rule)
+        : actions(its_actions),
+          acts{Action(true, actions.do_options, rule.name),
+               Action(rule.undoes, actions.undo_options, rule.name)},
+          reserve(actions.reserve, rule.otherwise_after_ns ? rule.about : std::vector<std::string>()) {}
+    Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
+    bool is_unsettled() const MAUVE_RT { return acts[0].is_unsettled() || acts[1].is_unsettled(); }
+
+    const RuleActions actions;
+    std::array<Action, 2> acts;        // by Act
+    std::shared_ptr<Overlay> overlay;  // from start() on
+    std::vector<std::size_t> shares;   // numbers of the rules that set one of its elements, too
     Reserve reserve;
     Worker commits;
     Worker prepares;
     Worker reserves;
     std::uint32_t name{0};           // in the trace
     Atomic<std::uint64_t> found{0};  // kKnown ... below, above them the ends that it was found after
-    Atomic<std::uint64_t> ends{0};   // of actions of this rule, and of those that contend with it
+    Atomic<std::uint64_t> ends{
+        0};  // of actions and activities of this rule, and of those that contend with it
+    Atomic<std::uint32_t> reset{kNoReset};
     Atomic<bool> in_effect{false};
     Atomic<bool> may_prepare{true};
     bool has_ended{false};  // an action of it, in this step of the decision thread
     RuleStatus status{};
     std::uint64_t applied{0};  // of found, by the decision thread
-    bool was_present{false};   // once, so far as the decision thread knows
     std::deque<Told> held{};   // decisions behind one whose report is not there yet, that one first
     std::array<std::deque<ActionReport>, kActs> reports{};  // by Act
     std::uint32_t structure{UINT32_MAX};                    // the preparation thread's: at its last look
@@ -148,6 +167,9 @@ class RuleRunner {
   void run_follower() noexcept;
   time_ns_t step() MAUVE_RT;
   void begin(const PendingAction& pending, time_ns_t now_ns) MAUVE_RT;
+  void reset_asked(time_ns_t now_ns) MAUVE_RT;
+  void show_activity() MAUVE_RT;
+  bool is_ready(std::size_t index, Act act) const MAUVE_RT;
   void hear_ends(time_ns_t now_ns) MAUVE_RT;
   void ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) MAUVE_RT;
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
@@ -157,6 +179,8 @@ class RuleRunner {
   bool reserve(std::size_t index) noexcept;
   bool prepare(std::size_t index);
   bool make_ready(Rule& rule, bool after_own);
+  bool make_ready(Rule& rule, Act act, std::uint64_t revision);
+  void load_overlays();
   void keep(Rule& rule);
   bool hinder(Rule& rule, std::string hindrance);
   std::string problem_of(const Rule& rule) const MAUVE_REQUIRES(told_mutex_);
@@ -173,6 +197,7 @@ class RuleRunner {
   void start_workers();
   void join_workers() noexcept;
   void end() noexcept;
+  Overlays& overlays() const noexcept { return host_.architecture().overlays(); }
 
   Host& host_;
   const Clock& clock_;
