@@ -56,7 +56,7 @@ void bind_values(py::module_& module) {
       .def_property_readonly(
           "element", [](const HeldElement& self) { return self.element.name; },
           "core, fsm, shell, state, 'property NAME', 'port NAME'; '': whether the target is there.")
-      .def_readonly("base", &HeldElement::base, "What it is without them; None: nobody knows.")
+      .def_readonly("base", &HeldElement::base, "What it is without them; None: unknown.")
       .def_readonly("wanted", &HeldElement::wanted)
       .def_readonly("rules", &HeldElement::rules, "Active ones that set it, the highest first.");
   py::class_<OverlaySpec>(module, "OverlaySpec", "What one rule wants while it is active.")
@@ -79,12 +79,7 @@ void bind_values(py::module_& module) {
       .def_property_readonly("rule", [](const Overlay& self) { return self.spec().rule; })
       .def_property_readonly("source", [](const Overlay& self) { return self.spec().source; })
       .def_property_readonly("priority", [](const Overlay& self) { return self.spec().priority; })
-      .def_property_readonly("assigns",
-                             [](const Overlay& self) {
-                               std::vector<Assignment> steps;
-                               for (const Assigned& one : self.spec().assigns) steps.push_back(one.step);
-                               return steps;
-                             })
+      .def_property_readonly("assigns", [](const Overlay& self) { return steps_of(self.spec().assigns); })
       .def_property_readonly("safety", [](const Overlay& self) { return self.spec().safety; })
       .def_property_readonly("is_active", &Overlay::is_active);
 }
@@ -160,12 +155,7 @@ Elements are named by a step that sets them. Raises MauveError (invalid_argument
       .def(
           "forgive", [](Overlays& self, const Assignment& step) { self.forgive(assigned(step).element); },
           py::arg("step"), "End the quarantine of all values of the element.")
-      .def("rejected",
-           [](const Overlays& self) {
-             std::vector<Assignment> steps;
-             for (const Assigned& one : self.rejected()) steps.push_back(one.step);
-             return steps;
-           })
+      .def("rejected", [](const Overlays& self) { return steps_of(self.rejected()); })
       .def("start_all", &Overlays::start_all, "An activation, at which persons' stops end.")
       .def("table", &Overlays::table, "What rules or persons have their hand on, sorted.");
 }

@@ -68,14 +68,9 @@ def list_rules(args: argparse.Namespace) -> int:
 def load_rules(args: argparse.Namespace) -> int:
     """Let the executor run a file's rules, all or none."""
     from mauve_msgs.srv import LoadRules  # noqa: PLC0415
-    from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
     path = str(Path(args.file).absolute()) if args.file else ""
-    request = LoadRules.Request(path=path, release=args.release)
-    with connected(first=True) as client:
-        reply = client.call(LoadRules, f"{args.executor}/load_rules", request)
-    return print_reply(reply, as_json=args.json)
+    return _ask(args, LoadRules, "load_rules", path=path, release=args.release)
 
 
 def add_reset(parser: argparse.ArgumentParser) -> None:
@@ -93,16 +88,11 @@ def add_reset(parser: argparse.ArgumentParser) -> None:
 def reset(args: argparse.Namespace) -> int:
     """End a latched rule, or a quarantine."""
     from mauve_msgs.srv import ResetRule  # noqa: PLC0415
-    from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
     if bool(args.rule) == bool(args.value):
         print("mauve rules reset: name either a rule or --value COMPONENT", file=sys.stderr)
         return BAD_USAGE
-    request = ResetRule.Request(rule=args.rule, component=args.value)
-    with connected(first=True) as client:
-        reply = client.call(ResetRule, f"{args.executor}/reset_rule", request)
-    return print_reply(reply, as_json=args.json)
+    return _ask(args, ResetRule, "reset_rule", rule=args.rule, component=args.value)
 
 
 def add_release(parser: argparse.ArgumentParser) -> None:
@@ -116,12 +106,17 @@ def add_release(parser: argparse.ArgumentParser) -> None:
 def release(args: argparse.Namespace) -> int:
     """End what was put over rules."""
     from mauve_msgs.srv import ReleaseRules  # noqa: PLC0415
+
+    return _ask(args, ReleaseRules, "release_rules", rule=args.rule)
+
+
+def _ask(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
+    """Ask the executor, and print what it answers."""
     from mauve_rt.cli.client import connected  # noqa: PLC0415
     from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
-    request = ReleaseRules.Request(rule=args.rule)
     with connected(first=True) as client:
-        reply = client.call(ReleaseRules, f"{args.executor}/release_rules", request)
+        reply = client.call(service_type, f"{args.executor}/{name}", service_type.Request(**fields))
     return print_reply(reply, as_json=args.json)
 
 

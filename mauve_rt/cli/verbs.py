@@ -29,7 +29,6 @@ from mauve_rt.cli.completion import (
 from mauve_rt.cli.verb import BAD_USAGE, OK, Verb
 from mauve_rt.errors import ArchitectureFileError, one_line
 
-OVER_RULES = "rules"  # of a request over the rules: all but safety rules
 _LOOK_S = 0.02  # between two looks at what a change cost
 
 
@@ -82,7 +81,7 @@ def _add_over(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--over-rules",
         nargs="?",
-        const=OVER_RULES,
+        const=None,
         default="",
         metavar="NAME",
         help="where a rule holds what is to be changed: put this above all rules but safety rules, or "
@@ -99,9 +98,15 @@ def _add_over_and_base(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _over(args: argparse.Namespace) -> str:
+    from mauve_rt.control.requests import OVER_RULES  # noqa: PLC0415 - what a request needs anyway
+
+    return OVER_RULES if args.over_rules is None else str(args.over_rules)
+
+
 def _over_of(args: argparse.Namespace) -> dict[str, Any]:
     """Fields of a request."""
-    return {"over": args.over_rules, "base": args.base}
+    return {"over": _over(args), "base": args.base}
 
 
 def _add_phase_timeout(parser: argparse.ArgumentParser) -> None:
@@ -245,7 +250,7 @@ def _stop(args: argparse.Namespace) -> int:
 def _start(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Start  # noqa: PLC0415
 
-    return _request(args, Start, "start", component=args.component, over=args.over_rules)
+    return _request(args, Start, "start", component=args.component, over=_over(args))
 
 
 def _replace_core(args: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-from mauve_rt._kernel import ActionStep, Overlay, OverlaySpec
+from mauve_rt._kernel import ActionStep, Overlay, Overlays, OverlaySpec
 from mauve_rt.control.requests import OVER_RULES, Code, RefusalError, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.model.schema import PropertyValue
@@ -57,17 +57,24 @@ def step_of(assignment: ActionStep, known: Sequence[Step] = ()) -> Step:
     for step in known:
         if (step.kind, step.target, step.name) == found and assignment_of(step).is_equal(assignment):
             return step
-    value = "" if assignment.value is None else _text(assignment.value)
+    value = "" if assignment.value is None else json.dumps(assignment.value)
     return Step(*found, value)
 
 
-def are_equal(some: Sequence[ActionStep], others: Sequence[ActionStep]) -> bool:
-    """Whether they set the same, one by one."""
-    return len(some) == len(others) and all(map(ActionStep.is_equal, some, others))
-
-
-def _text(value: PropertyValue) -> str:
-    return json.dumps(value)
+def spec_of(request: Request, present: Overlay | None = None) -> OverlaySpec:
+    """What a rule wants by its request; of a release, what that of the `present` overlay leaves."""
+    stated = [assignment_of(step) for step in request.steps]
+    if not request.release or present is None:
+        return OverlaySpec(request.rule, stated, priority=request.priority)
+    assigns = present.assigns
+    stays = len(stated) == len(assigns) and all(map(ActionStep.is_equal, stated, assigns))
+    return OverlaySpec(
+        request.rule,
+        assigns,
+        leaves=stated,
+        priority=present.priority,
+        leaves_over_persons=stays,  # a rule without `undo`: what it did stays
+    )
 
 
 @contextmanager
@@ -80,25 +87,12 @@ def _of_rule(request: Request, runtime: Runtime) -> Iterator[list[Step]]:
         if overlay is None:
             yield []
             return
-        leaves = [assignment_of(step) for step in request.steps]
-        spec = OverlaySpec(
-            request.rule,
-            overlay.assigns,
-            leaves=leaves,
-            priority=overlay.priority,
-            leaves_over_persons=are_equal(
-                leaves, overlay.assigns
-            ),  # of a rule without `undo`: what it did stays
-        )
-        overlay = overlays.put(source, spec)
+        overlay = overlays.put(source, spec_of(request, overlay))
         yield _steps(runtime, overlay, request, is_active=False)
-        overlays.set_active(overlay, is_active=False)
-        overlays.settle_ended()
-        overlays.set_engaged(overlay, is_engaged=False)
+        _end(overlays, overlay)
         architecture.note_overlays()
         return
-    assigns = [assignment_of(step) for step in request.steps]
-    overlay = overlays.put(source, OverlaySpec(request.rule, assigns, priority=request.priority))
+    overlay = overlays.put(source, spec_of(request))
     was_active = overlay.is_active
     architecture.follow()  # what is there before
     steps = _steps(runtime, overlay, request, is_active=True)
@@ -108,11 +102,15 @@ def _of_rule(request: Request, runtime: Runtime) -> Iterator[list[Step]]:
         yield steps
     except BaseException:
         if not was_active:
-            overlays.set_active(overlay, is_active=False)
-            overlays.settle_ended()
-            overlays.set_engaged(overlay, is_engaged=False)
+            _end(overlays, overlay)
         raise
     architecture.note_overlays()
+
+
+def _end(overlays: Overlays, overlay: Overlay) -> None:
+    overlays.set_active(overlay, is_active=False)
+    overlays.settle_ended()
+    overlays.set_engaged(overlay, is_engaged=False)
 
 
 def _found(runtime: Runtime, rule: str, source: str) -> Overlay | None:

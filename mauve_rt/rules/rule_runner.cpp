@@ -41,12 +41,6 @@ OverlaySpec overlay_of(const mauve::rules::Rule& rule, const RuleActions& action
           .leaves_over_persons = !rule.undoes || actions.takes_over};
 }
 
-ActionSteps steps_of(const std::vector<Assigned>& all) {
-  ActionSteps steps;
-  for (const Assigned& one : all) steps.push_back(one.step);
-  return steps;
-}
-
 /// Of rules that are at work and not among these: they end at once.
 void add_released(const Overlays& overlays, std::vector<mauve::rules::Rule>& rules,
                   std::vector<RuleActions>& actions) {

@@ -1,7 +1,7 @@
 """What a supervisor asks the executor about a rule before it needs it, without ROS and with injected time.
 
 Once for each start of the executor, when a rule is armed for the first time: would the executor take what it
-does and undoes (dry runs)? What would be refused is told then, not when the link is lost.
+does and undoes (dry runs)? What would be refused is reported then, not when the link is lost.
 """
 
 from collections import deque

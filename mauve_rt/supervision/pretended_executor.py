@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from mauve_rt._kernel import Overlays, OverlaySpec
+from mauve_rt._kernel import Overlays
 from mauve_rt.control.requests import Code, Outcome, Request
-from mauve_rt.control.wishes import are_equal, assignment_of, step_of
+from mauve_rt.control.wishes import spec_of, step_of
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
@@ -63,18 +63,7 @@ class PretendedExecutor:
 
     def _wanted(self, request: Request) -> list[Step]:
         """What a rule's request comes to, besides other rules."""
-        stated = [assignment_of(step) for step in request.steps]
-        found = self._overlays.find(request.rule)
-        assigns = found.assigns if request.release and found is not None else stated
-        leaves = stated if request.release else []
-        spec = OverlaySpec(
-            request.rule,
-            assigns,
-            leaves=leaves,
-            priority=request.priority,
-            leaves_over_persons=are_equal(leaves, assigns),
-        )
-        overlay = self._overlays.put("", spec)
+        overlay = self._overlays.put("", spec_of(request, self._overlays.find(request.rule)))
         steps = self._overlays.steps_if(overlay, is_active=not request.release)
         self._overlays.set_active(overlay, is_active=not request.release)
         self._overlays.settle_ended()

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import count
 
-from mauve_rt._kernel import ActionStep, Overlays, OverlaySpec
+from mauve_rt._kernel import ActionStep, Overlays
 from mauve_rt.control.requests import Code, Outcome, Request
-from mauve_rt.control.wishes import are_equal, assignment_of
+from mauve_rt.control.wishes import spec_of
 from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
 from mauve_rt.supervision.remote_rules import RemoteRules
@@ -172,24 +172,10 @@ class World:
 
     def take(self, request: Request) -> None:
         """The executor carries out a rule's request; tell() publishes it."""
-        stated = [assignment_of(step) for step in request.steps]
         found = self._overlays.find(request.rule)
-        if not request.release:
-            spec = OverlaySpec(request.rule, stated, priority=request.priority)
-        elif found is not None:
-            stays = are_equal(
-                stated, found.assigns
-            )  # of a rule without `undo`, be the base a person's choice
-            spec = OverlaySpec(
-                request.rule,
-                found.assigns,
-                leaves=stated,
-                priority=found.priority,
-                leaves_over_persons=stays,
-            )
-        else:
+        if request.release and found is None:
             return
-        overlay = self._overlays.put("", spec)
+        overlay = self._overlays.put("", spec_of(request, found))
         steps = self._overlays.steps_if(overlay, not request.release)
         self._overlays.set_active(overlay, not request.release)
         self._overlays.settle_ended()

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <iterator>
 
-#include "mauve_rt/base/contract.hpp"
-
 namespace mauve {
 
 namespace {
@@ -98,13 +96,6 @@ int place_of(const Assignment& step) {
   return 5;
 }
 
-std::vector<Assignment> steps_of(const std::vector<Assigned>& all) {
-  std::vector<Assignment> steps;
-  steps.reserve(all.size());
-  for (const Assigned& one : all) steps.push_back(one.step);
-  return steps;
-}
-
 /// As they are safe whatever they undo.
 std::vector<Assigned> in_order(const std::vector<Assigned>& all) {
   std::vector<Assigned> sorted;
@@ -134,6 +125,13 @@ std::vector<Assigned> differences(const std::vector<Assigned>& found,
 }
 
 }  // namespace
+
+std::vector<Assignment> steps_of(const std::vector<Assigned>& all) {
+  std::vector<Assignment> steps;
+  steps.reserve(all.size());
+  for (const Assigned& one : all) steps.push_back(one.step);
+  return steps;
+}
 
 bool is_same_effect(const Assignment& one, const Assignment& other) {
   for (const char* whole : {"add_", "remove_"}) {
@@ -188,7 +186,8 @@ void Overlay::set_active(bool is_active) noexcept {
 }
 
 void Overlay::set_engaged(bool is_engaged) noexcept {
-  const std::uint32_t before = engaged_.load(std::memory_order_relaxed);  // relaxed: nobody else writes it
+  const std::uint32_t before =
+      engaged_.load(std::memory_order_relaxed);  // relaxed: this thread alone writes it
   if (((before & 1U) != 0) != is_engaged) engaged_.store(before + 1, std::memory_order_release);
 }
 
@@ -230,7 +229,7 @@ std::shared_ptr<Overlay> Overlays::next_of(const std::string& source, OverlaySpe
   auto next = std::make_shared<Overlay>(std::move(spec));
   for (const auto& old : all_) {
     if (old->spec().source != source || old->spec().rule != next->spec().rule) continue;
-    next->activity_.store(old->activity(), std::memory_order_relaxed);  // relaxed: nobody decides it yet
+    next->activity_.store(old->activity(), std::memory_order_relaxed);  // relaxed: it is not in use yet
     next->engaged_.store(old->engaged(), std::memory_order_relaxed);
     if (!old->is_engaged()) continue;
     next->given_back_ = old->given_back_;
@@ -290,7 +289,7 @@ std::vector<const Overlay*> Overlays::ranked(const If& supposed) const {
   return found;
 }
 
-/// Whether nobody takes one of the elements of a rule that makes sense only whole.
+/// Whether none of the elements of a rule that makes sense only whole is taken.
 bool Overlays::contributes(const Overlay& whole, const std::vector<const Overlay*>& higher) const {
   for (const Assigned& one : whole.spec().assigns) {
     if (over_.contains(one.element) || is_rejected(one.element, one.step)) return false;
@@ -334,17 +333,22 @@ Wanted Overlays::wanted(const Element& element, const If& supposed) const {
 
 /// What it is without rules and persons: what rules that have ended leave comes first.
 std::optional<Assignment> Overlays::base_of(const Element& element, const If& supposed) const {
-  const auto found = bases_.find(element);
-  const bool is_persons = found != bases_.end() && is_person(found->second.author);
   for (const auto& each : all_) {
     const bool has_ended =
         each.get() == supposed.rule ? !supposed.is_active : each->activity() == Activity::ended;
-    if (!has_ended || (is_persons && !each->spec().leaves_over_persons)) continue;
+    if (!has_ended || !may_leave(*each, element)) continue;
     for (const Assigned& one : each->spec().leaves) {
       if (one.element == element) return one.step;
     }
   }
+  const auto found = bases_.find(element);
   return found != bases_.end() ? found->second.value : std::nullopt;
+}
+
+/// Whether the rule's end gives the element another base: not where a person gave it one.
+bool Overlays::may_leave(const Overlay& rule, const Element& element) const {
+  const auto found = bases_.find(element);
+  return rule.spec().leaves_over_persons || found == bases_.end() || !is_person(found->second.author);
 }
 
 /// Who brings the element to what is wanted: the rule that holds it, else the highest that assigns it.
@@ -432,10 +436,7 @@ void Overlays::settle_ended() {
     if (!each->activity_.compare_exchange_strong(ended, Activity::inactive, std::memory_order_acq_rel))
       continue;
     for (const Assigned& one : each->spec().leaves) {
-      if (one.element.target.empty()) continue;
-      const auto found = bases_.find(one.element);
-      const bool is_persons = found != bases_.end() && is_person(found->second.author);
-      if (!is_persons || each->spec().leaves_over_persons)
+      if (!one.element.target.empty() && may_leave(*each, one.element))
         change_base(one.element, one.step, std::string(kByRule) + each->spec().rule);
     }
   }
@@ -504,9 +505,7 @@ void Overlays::note(const Assigned& assigned, const std::string& author) {
     return;
   }
   if (step.kind == "start") stopped_.erase(element.target);
-  std::erase_if(rejected_, [&](const Assigned& one) {
-    return one.element == element && is_same_effect(one.step, step);
-  });
+  pardon(assigned);
   if (const auto over = over_.find(element); over != over_.end() && is_same_effect(over->second.step, step))
     return;
   const Wanted now = wanted(element, {});
@@ -553,9 +552,7 @@ std::string Overlays::holder_against(const Assigned& assigned) const {
 
 void Overlays::put_over(const Assigned& assigned, const std::string& safety_rule) {
   const LockGuard lock(mutex_);
-  std::erase_if(rejected_, [&](const Assigned& one) {
-    return one.element == assigned.element && is_same_effect(one.step, assigned.step);
-  });
+  pardon(assigned);
   over_[assigned.element] = {.step = assigned.step, .safety_rule = safety_rule};
   outdate(assigned.element);
 }
@@ -613,6 +610,13 @@ void Overlays::reject(const Assigned& assigned) {
 void Overlays::note_rejected(const Assigned& assigned) {
   if (!is_rejected(assigned.element, assigned.step)) rejected_.push_back(assigned);
   outdate(assigned.element);
+}
+
+/// A person asks for it: it may be put in again.
+void Overlays::pardon(const Assigned& assigned) {
+  std::erase_if(rejected_, [&](const Assigned& one) {
+    return one.element == assigned.element && is_same_effect(one.step, assigned.step);
+  });
 }
 
 void Overlays::forgive(const Element& element) {

@@ -245,12 +245,7 @@ class Services:
 
     def _on_load_rules(self, request: Any, response: Any) -> Any:
         code, response.message = self._load_rules(request.path, request.release)
-        response.success, response.code = code is Code.OK, int(code)
-        self._state.refresh(again=True)
-        response.instance_id, response.revision = self._runtime.instance_id, self._runtime.revision
-        text = f"rules of {request.path or 'the same file'}: {response.message}"
-        (self._logger.info if response.success else self._logger.error)(text)
-        return response
+        return self._answered(response, code, f"rules of {request.path or 'the same file'}")
 
     def _reset_rule(self, request: Any, response: Any) -> Any:
         code, response.message = Code.INVALID, "name a rule or a component"

@@ -3,7 +3,7 @@
 import struct
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -56,18 +56,6 @@ ADD = (
     Step("start", "second"),
 )
 REMOVE = (Step("stop", "second"), Step("remove_component", "second"), Step("remove_resource", "sum"))
-
-
-@pytest.fixture
-def runtime(tmp_path: Path, plugin_prefix: Path) -> Iterator[Runtime]:
-    path = tmp_path / "robot.yaml"
-    path.write_text(FILE, encoding="utf-8")
-    runtime = Runtime(lambda: load_architecture(path))
-    runtime.configure()
-    runtime.activate()
-    yield runtime
-    runtime.deactivate()
-    runtime.cleanup()
 
 
 @pytest.fixture

@@ -1,39 +1,23 @@
 """What rules and persons want of the same: requests carried out on real components without ROS."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
 import pytest
 
 from mauve_rt.control.control import Control
 from mauve_rt.control.requests import OVER_RULES, Code, Outcome, Request, Step
 from mauve_rt.control.runtime import Runtime
-from mauve_rt.model import load_architecture
 
 USUAL, SAFE, THIRD = "executor_tests/Counter", "executor_tests/Backwards", "executor_tests/Reluctant"
 COMPONENT = (
     "{shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm, "
     "alternatives: [executor_tests/Backwards, executor_tests/Reluctant]}"
 )
-ROBOT = f"""\
+FILE = f"""\
 mauve: 1
 executor: {{namespace: /robot_1}}
 components:
   one: {COMPONENT}
   two: {COMPONENT}
 """
-
-
-@pytest.fixture
-def runtime(tmp_path: Path, plugin_prefix: Path) -> Iterator[Runtime]:
-    path = tmp_path / "robot.yaml"
-    path.write_text(ROBOT, encoding="utf-8")
-    runtime = Runtime(lambda: load_architecture(path))
-    runtime.configure()
-    runtime.activate()
-    yield runtime
-    runtime.deactivate()
-    runtime.cleanup()
 
 
 class World:

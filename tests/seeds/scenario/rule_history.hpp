@@ -61,16 +61,6 @@ class RuleHistory {
              rules_[i].rule.name + " has begun an action that has no outcome");
     findings_.count("decisions", static_cast<int>(all_.size()));
   }
-  bool has_told(int rule, rules::Why why) const {
-    return std::ranges::any_of(all_, [&](const rules::Told& told) {
-      return told.decision.rule == rule && told.decision.why == why;
-    });
-  }
-  bool has_told(int rule, rules::Decided decided) const {
-    return std::ranges::any_of(all_, [&](const rules::Told& told) {
-      return told.decision.rule == rule && told.decision.decided == decided;
-    });
-  }
 
  private:
   struct Life {

@@ -52,6 +52,8 @@ struct Assigned {
   bool operator==(const Assigned&) const = default;
 };
 
+/// Without the elements. [non-rt]
+std::vector<Assignment> steps_of(const std::vector<Assigned>& all);
 /// Whether both leave the element the same. A core on probation is the same core. [non-rt]
 bool is_same_effect(const Assignment& one, const Assignment& other);
 /// What an element is, as the step that would make it so; nothing: no step can, or it is not there. [non-rt]
@@ -266,6 +268,8 @@ class Overlays {
       MAUVE_REQUIRES(mutex_);
   void outdate(const Element& element) MAUVE_REQUIRES(mutex_);
   void note_rejected(const Assigned& assigned) MAUVE_REQUIRES(mutex_);
+  void pardon(const Assigned& assigned) MAUVE_REQUIRES(mutex_);
+  bool may_leave(const Overlay& rule, const Element& element) const MAUVE_REQUIRES(mutex_);
 
   std::vector<Assigned> steps(const Overlay& rule, bool is_active) const MAUVE_REQUIRES(mutex_);
   void enter_wanted(std::vector<Assigned>& found, const Element& element, const std::string& kind,

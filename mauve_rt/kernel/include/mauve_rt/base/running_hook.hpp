@@ -29,7 +29,7 @@ class RunningHook {
   RunningHook(const RunningHook&) = delete;
   RunningHook& operator=(const RunningHook&) = delete;
 
-  /// The hook has returned: from here on nobody calls it off. Throws Error (wrong_revision) where somebody has.
+  /// The hook has returned: from here on it cannot be called off. Throws Error (wrong_revision) where it was.
   void leave();
 
   /// What that thread executes now.
