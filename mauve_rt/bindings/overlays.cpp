@@ -61,25 +61,29 @@ void bind_values(py::module_& module) {
       .def_readonly("rules", &HeldElement::rules, "Active ones that set it, the highest first.");
   py::class_<OverlaySpec>(module, "OverlaySpec", "What one rule wants while it is active.")
       .def(py::init([](std::string rule, const rules::ActionSteps& assigns, const rules::ActionSteps& leaves,
-                       std::int64_t priority, bool safety, bool whole, bool leaves_over_persons) {
+                       std::int64_t priority, bool safety, bool whole, bool ends_with_source,
+                       bool leaves_over_persons) {
              return OverlaySpec{.rule = std::move(rule),
                                 .source = {},
                                 .priority = priority,
                                 .safety = safety,
                                 .whole = whole,
+                                .ends_with_source = ends_with_source,
                                 .assigns = rules::assigned(assigns),
                                 .leaves = rules::assigned(leaves),
                                 .leaves_over_persons = leaves_over_persons};
            }),
            py::arg("rule"), py::arg("assigns"), py::kw_only(), py::arg("leaves") = rules::ActionSteps{},
            py::arg("priority") = 0, py::arg("safety") = false, py::arg("whole") = false,
-           py::arg("leaves_over_persons") = false,
+           py::arg("ends_with_source") = false, py::arg("leaves_over_persons") = false,
            "`leaves`: what becomes the base at its end; else what was there before comes back.");
   py::class_<Overlay, std::shared_ptr<Overlay>>(module, "Overlay", "One rule's overlay.")
       .def_property_readonly("rule", [](const Overlay& self) { return self.spec().rule; })
       .def_property_readonly("source", [](const Overlay& self) { return self.spec().source; })
       .def_property_readonly("priority", [](const Overlay& self) { return self.spec().priority; })
       .def_property_readonly("assigns", [](const Overlay& self) { return steps_of(self.spec().assigns); })
+      .def_property_readonly("ends_with_source",
+                             [](const Overlay& self) { return self.spec().ends_with_source; })
       .def_property_readonly("safety", [](const Overlay& self) { return self.spec().safety; })
       .def_property_readonly("is_active", &Overlay::is_active);
 }

@@ -98,7 +98,7 @@ def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
     file = RulesFile(path)
     found = standing_findings(file, model)
     if model is not None:
-        found += rehearsal_problems(file, model)[0]
+        found += rehearsal_problems(file, model)
     if found:
         raise ArchitectureFileError(path, found)
     print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")

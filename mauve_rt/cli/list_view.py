@@ -15,6 +15,13 @@ from mauve_rt.counts import counted
 
 # As mauve_msgs/msg/ComponentInfo.
 STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}
+# As mauve_msgs/msg/HeldElement; else it is a rule.
+_HOLDERS = {
+    "over": "a person, above the rules",
+    "stop": "a person, who stopped it",
+    "base": "no rule any longer",
+    "none": "none of them, as every value was rejected",
+}
 _STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
 _WAIT_FREE_KINDS = ("shared_data", "latest_value", "ring_buffer")  # the other kinds have a lock, or know best
 _ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
@@ -28,6 +35,7 @@ def print_components(reply: Any, out: Console | None = None) -> None:
             out.print(table)
     for name, element, author in _authors(reply):
         out.print(f"[bold]{name}[/]: {escape(element)} by {escape(author)}", soft_wrap=True)
+    print_held(reply, out)
     for component in reply.components:
         _print_remarks(component, out)
     for component in reply.components:
@@ -41,6 +49,16 @@ def print_components(reply: Any, out: Console | None = None) -> None:
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
     out.print(f"revision {reply.revision}", style="dim")
+
+
+def print_held(reply: Any, out: Console) -> None:
+    """Elements that rules or persons have their hand on: who wants what, and what it is without rules."""
+    for held in reply.held:
+        what = f"{held.element or 'presence'} held by {_HOLDERS.get(held.holder, held.holder)}"
+        wanted, base = (text or "not known" for text in (held.wanted, held.base))
+        out.print(
+            f"[bold]{held.target}[/]: {escape(f'{what}: {wanted}; without rules: {base}')}", soft_wrap=True
+        )
 
 
 def _print_remarks(component: Any, out: Console) -> None:

@@ -38,6 +38,7 @@ def list_rules(args: argparse.Namespace) -> int:
     """How each rule fares."""
     from mauve_msgs.srv import ListRules  # noqa: PLC0415 - ROS takes its time to load
     from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.cli.list_view import print_held  # noqa: PLC0415
     from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
 
     with connected(first=True) as client:
@@ -62,6 +63,7 @@ def list_rules(args: argparse.Namespace) -> int:
     for rule in reply.rules:
         if rule.problem:
             out.print(f"[bold red]{rule.name}[/] cannot act: {escape(rule.problem)}", soft_wrap=True)
+    print_held(reply, out)
     return OK
 
 

@@ -50,20 +50,21 @@ def _check(args: argparse.Namespace) -> int:
     from mauve_rt.model import load_architecture  # noqa: PLC0415
     from mauve_rt.supervision.rule_checks import logic_findings  # noqa: PLC0415
     from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
+    from mauve_rt.supervision.rule_warnings import form_warnings, model_warnings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(args.file)
     model = load_architecture(args.architecture) if args.architecture else None
     found = [*standing_findings(file, model), *logic_findings(file)]
     periods: Mapping[str, float] = {}
-    warnings: list[Problem] = []
+    warnings = list(form_warnings(file))
     if model is not None:
-        from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
-        from mauve_rt.supervision.silence_limits import limit_warnings  # noqa: PLC0415
+        from mauve_rt.supervision.rehearsal import rehearsal, rehearsal_problems  # noqa: PLC0415
 
-        refused, periods = rehearsal_problems(file, model)
-        found += refused
-        warnings = list(limit_warnings(file, model, periods))
+        found += rehearsal_problems(file, model)
+        with rehearsal(model) as executor:
+            periods = executor.periods_s()
+            warnings += model_warnings(file, model, executor)
     _print_bounds(file, periods)
     for problem in sorted(found, key=lambda each: (each.line, each.column)):
         _complain(file, problem)

@@ -112,6 +112,7 @@ class Request:
     rule: str = ""  # whose action it is: its steps are what it wants while it is active
     release: bool = False  # the rule ends; its steps become the base
     priority: int = 0  # of the rule
+    release_on_loss: bool = False  # the rule ends, too, when the node that asks is gone
     over: str = ""  # a person's request over the rules: OVER_RULES, or the name of a safety rule
     base: bool = False  # a person's request about what comes back once rules have ended
     dry_run: bool = False

@@ -65,7 +65,9 @@ def spec_of(request: Request, present: Overlay | None = None) -> OverlaySpec:
     """What a rule wants by its request; of a release, what that of the `present` overlay leaves."""
     stated = [assignment_of(step) for step in request.steps]
     if not request.release or present is None:
-        return OverlaySpec(request.rule, stated, priority=request.priority)
+        return OverlaySpec(
+            request.rule, stated, priority=request.priority, ends_with_source=request.release_on_loss
+        )
     assigns = present.assigns
     stays = len(stated) == len(assigns) and all(map(ActionStep.is_equal, stated, assigns))
     return OverlaySpec(

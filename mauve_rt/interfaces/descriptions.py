@@ -190,8 +190,14 @@ def architecture_state(
         error=error,
         rules=list(rules),
         active_rules=[overlay.rule for overlay in overlays.active()] if overlays is not None else [],
-        held=[_held(each) for each in overlays.table()] if overlays is not None else [],
+        held=held_elements(runtime),
     )
+
+
+def held_elements(runtime: Runtime) -> list[Any]:
+    """HeldElement of all that rules or persons have their hand on."""
+    overlays = runtime.overlays()
+    return [_held(each) for each in overlays.table()] if overlays is not None else []
 
 
 def _held(element: HeldElement) -> Any:

@@ -230,6 +230,11 @@ class QosModel(Section):
         _DURATION_MS, "a publisher that is silent for longer counts as gone; 0: never", default=0.0
     )
 
+    @property
+    def is_kept(self) -> bool:
+        """Whether subscribers that come later receive the last messages."""
+        return (self.durability or self.profile) == "transient_local"
+
 
 class _Qos(Part):
     """A QosModel, or the name of a profile."""

@@ -6,10 +6,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from mauve_rt._kernel import Simulation
+from mauve_rt._kernel import Overlays, OverlaySpec, Simulation
 from mauve_rt.control import requests
 from mauve_rt.control.control import Control
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.control.wishes import assignment_of
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.steps import Change, Step, place_of_step
@@ -41,8 +42,16 @@ class Rehearsal:
         return unobservable(file, leaf, self._runtime.host, topics)
 
     def periods_s(self) -> Mapping[str, float]:
-        """Of every component."""
+        """Of every component, s."""
         return {each.name: each.period_ns / 1e9 for each in self._runtime.components()}
+
+    def is_so(self, steps: Sequence[Step]) -> bool:
+        """Whether all that these steps set is so already."""
+        overlays = Overlays()
+        overlay = overlays.put("", OverlaySpec("", [assignment_of(step) for step in steps]))
+        return not overlays.steps_if(
+            overlay, is_active=True, description=self._runtime.architecture.describe()
+        )
 
     def carry_out(self, steps: Sequence[Step], *, dry_run: bool = False) -> None:
         """Ask for a transaction.
@@ -113,23 +122,20 @@ def try_rule(file: RulesFile, index: int, model: ArchitectureModel) -> None:
             raise file.error(("rules", index, "undo", "do", error.index), str(error)) from None
 
 
-def rehearsal_problems(
-    file: RulesFile, model: ArchitectureModel
-) -> tuple[list[Problem], Mapping[str, float]]:
-    """What the executor of `model` would refuse of every rule, and the periods of its components, s.
+def rehearsal_problems(file: RulesFile, model: ArchitectureModel) -> list[Problem]:
+    """What the executor of `model` would refuse of every rule.
 
     Raises:
         ArchitectureFileError: the architecture cannot be built or configured.
     """
     with rehearsal(model) as executor:
-        periods_s = executor.periods_s()
         found = list(_unobservable(executor, file, model))
     for index in range(len(file.rules.rules)):
         try:
             try_rule(file, index, model)
         except ArchitectureFileError as error:
             found += error.problems
-    return found, periods_s
+    return found
 
 
 def _unobservable(executor: Rehearsal, file: RulesFile, model: ArchitectureModel) -> Iterator[Problem]:

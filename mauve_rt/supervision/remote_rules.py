@@ -49,11 +49,12 @@ class RemoteRules:
         ids: Iterator[str],
         name: Name = str,
         hears_all: bool = False,
+        release_on_loss: bool = False,
     ) -> None:
         """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells.
 
         `ids` has one for each request, which the executor has never seen; `name`: the full name of a topic;
-        `hears_all`: even what is heard in the executor only.
+        `hears_all`: even what is heard in the executor only; `release_on_loss`: as of Request.
         """
         self._rules = list(rules)
         self._engine = RuleEngine(rule_specs(rules))
@@ -65,6 +66,7 @@ class RemoteRules:
         self._act = act
         self._decide = decide
         self._name = name
+        self._release_on_loss = release_on_loss
         self._ids = ids
         self._view: ArchitectureView | None = None
         self._view_signals = ViewSignals(self._engine)
@@ -210,6 +212,7 @@ class RemoteRules:
             rule=each.rule.name,
             release=pending.act == "undo",
             priority=each.rule.priority,
+            release_on_loss=self._release_on_loss,
         )
         self._flight = _Flight(each, pending.act, request, now_ns + ANSWER_TIMEOUT_NS)
         self._act(request)

@@ -11,9 +11,12 @@ then takes its new part at its next release, within one period more.
 In the supervisor the request travels and the new part is built when it is asked for; both are assumed.
 
 Other rules and their components have no part in that, whatever they do: each rule has threads of its own.
-But a rule of lower rank about one of the same components may be in the middle of its action: that is called
-off, and an adopt that does not end is given up after `CALLED_OFF_S`. And two rules that add, remove or wire
-something commit one after the other.
+But a rule of no higher rank about one of the same components may be in the middle of its action: that is
+called off, and an adopt that does not end is given up after `CALLED_OFF_S`. A rule about one of the same
+components, of whatever rank, that has just acted leaves another component behind: the new part is built
+again. And two rules that add, remove or wire something commit one after the other.
+
+Not counted is a request of a person about one of the same components, which holds them while it prepares.
 
 A reserve action waits for nothing: it stops its components, and gives up those that still execute.
 """
@@ -33,7 +36,7 @@ WOKEN_S = (
 )
 FOLLOWED_S = 0.020  # assumed of the executor's ordinary thread, which sees that the architecture changed
 SENT_S = 0.020  # assumed of a supervisor: it is late by no more, and its request arrives
-BUILT_S = 0.200  # assumed of the executor, which builds the new part when it is asked
+BUILT_S = 0.200  # assumed of the executor, which builds the new part
 CALLED_OFF_S = 0.100  # the kernel's patience with an adopt or take under way
 TIMEOUT_S = 1.0  # of the kernel's commits
 RESERVE_S: Mapping[str, float] = {"stop": 0.050, "safe_outputs": 0.001}  # the patience of rules/reserve.hpp
@@ -100,13 +103,22 @@ def _beside(rule: Rule, others: Iterable[Rule]) -> Iterator[BoundPart]:
     if rule.where != "executor":
         return
     own = [other for other in others if other.where == "executor" and other.name != rule.name]
-    lower = [each.name for each in own if each.priority <= rule.priority and _about(rule) & _about(each)]
+    rivals = [each for each in own if _about(rule) & _about(each)]
+    lower = [each.name for each in rivals if _rank(each) <= _rank(rule)]
     if lower:
         yield BoundPart(f"until the action of {', '.join(lower)} is called off", CALLED_OFF_S)
+    if rivals:
+        names = ", ".join(each.name for each in rivals)
+        what = f"until the new part is built again, where {names} has just acted"
+        yield BoundPart(what, BUILT_S, assumed=True)
     wiring = [each.name for each in own if _wires(each)] if _wires(rule) else []
     if wiring:
         what = f"until {', '.join(wiring)} let go of the architecture's structure"
         yield BoundPart(what, TIMEOUT_S * len(wiring))
+
+
+def _rank(rule: Rule) -> tuple[bool, int]:
+    return rule.safety, rule.priority
 
 
 def _about(rule: Rule) -> set[str]:

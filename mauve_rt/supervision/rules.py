@@ -2,6 +2,7 @@
 
     mauve: 1
     executor: executor              # relative to the supervisor's namespace
+    on_supervisor_loss: keep        # or release: what its rules have in force ends when it is gone
     rules:
       - name: link_lost
         when: {silence: {topic: radio/in, type: mauve_msgs/msg/PeerMessage, longer_than_s: 1.0}}
@@ -122,6 +123,12 @@ class Rules(Section):
     mauve: Literal[1] = setting(Choice(1), "version of the schema")
     executor: str = setting(
         ROS_NAME, "node of the executor, relative to the namespace of the supervisor", default="executor"
+    )
+    on_supervisor_loss: Literal["keep", "release"] = setting(
+        Choice("keep", "release"),
+        "what the supervisor's rules have in force when it is gone: keep it for a later supervisor of its "
+        "name, or bring back what was there before",
+        default="keep",
     )
     rules: list[Rule] = setting(ListOf(Part(Rule), few=1), "the rules")
 

@@ -44,20 +44,26 @@ def _writers(
     leaf: When, model: ArchitectureModel, periods_s: Mapping[str, float]
 ) -> Iterator[tuple[str, float]]:
     """The quickest component that writes what is listened to, or the topic's deadline, and the period."""
-    name, resource = _listened_to(leaf, model)
+    name, resource = listened_to(leaf, model)
     if resource is not None and resource.topic is not None and resource.topic.qos.deadline_ms:
         yield f"topic {resource.topic.name}", resource.topic.qos.deadline_ms / 1e3
-    writing = {
-        link.component
-        for link in model.connections
-        if link.resource == name and not link.service.startswith(("read", "get"))
-    }
+    writing = writers_of(name, model)
     if writing and writing <= periods_s.keys():
         quickest = min(writing, key=lambda one: periods_s[one])
         yield quickest, periods_s[quickest]
 
 
-def _listened_to(leaf: When, model: ArchitectureModel) -> tuple[str, ResourceModel | None]:
+def writers_of(resource: str, model: ArchitectureModel) -> set[str]:
+    """Components that write a resource."""
+    return {
+        link.component
+        for link in model.connections
+        if link.resource == resource and not link.service.startswith(("read", "get"))
+    }
+
+
+def listened_to(leaf: When, model: ArchitectureModel) -> tuple[str, ResourceModel | None]:
+    """The resource that a condition names, or the one that its topic is bound to; '', None: there is none."""
     if name := str(leaf.parameters.get("resource") or ""):
         return name, model.resources.get(name)
     topic = full_name(str(leaf.parameters.get("topic") or ""), model.namespace)

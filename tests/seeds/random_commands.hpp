@@ -199,11 +199,19 @@ class RandomCommands {
   /// Of one that was started: its thread may not know of that yet.
   void stop_at_once(std::size_t component) {
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    const bool is_done = attempt("stop at once " + name(component), kStop,
-                                 [&] { deployer_->stop(name(component), {.timeout_ns = kStop}); });
+    bool was_faulted = false;  // it may be repaired by now
+    const bool is_done = attempt("stop at once " + name(component), kStop, [&] {
+      try {
+        deployer_->stop(name(component), {.timeout_ns = kStop});
+      } catch (const Error& error) {
+        was_faulted = std::string(error.what()).find("found FAULTED") != std::string::npos;
+        throw;
+      }
+    });
     const bool has_stalled = seeds::outcome().stalled_ns != stalled_ns;  // it may have timed out
-    expect(is_done || has_stalled || shared_->has_hangs || is_shut_down_ || is_faulted(component),
-           name(component) + " was started, and cannot be stopped");
+    expect(
+        is_done || has_stalled || shared_->has_hangs || is_shut_down_ || was_faulted || is_faulted(component),
+        name(component) + " was started, and cannot be stopped");
     if (is_done && !is_shut_down_) shared_->components[component].is_stopped = true;
   }
   bool is_faulted(std::size_t component) const {

@@ -280,7 +280,11 @@ class RandomRules {
       const auto is_about_it = [&](const KnownRule& known) {
         return known.rule.about.front() == held.element.target;
       };
-      bool is_expected = !has_interfered_ && RuleParts::hung_states == 0 && held.wanted.step.has_value();
+      const std::shared_ptr<Component> component = architecture_->find_component(held.element.target);
+      bool is_expected =
+          !has_interfered_ && RuleParts::hung_states == 0 && held.wanted.step.has_value() &&
+          component != nullptr &&  // of one that does not run, a rule that is gone undoes nothing yet
+          component->task().state() == ComponentState::running;
       for (std::size_t i = 0; i < known_.size(); ++i)
         is_expected =
             is_expected && (!is_about_it(known_[i]) || (known_[i].is_good && facts[i].status.armed));

@@ -13,6 +13,7 @@ from mauve_rt._kernel import ComponentDescription, RecentMaxima, RuleFacts, Shad
 from mauve_rt.control.open_changes import long_ones, open_changes
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words
+from mauve_rt.interfaces.descriptions import held_elements
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
@@ -54,7 +55,8 @@ class Diagnostics:
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
         array.status += [self._shadow(record) for record in self._runtime.shadows()]
-        array.status += [self._rule(facts) for facts in self._rules.facts()]
+        held = held_elements(self._runtime)
+        array.status += [self._rule(facts, held) for facts in self._rules.facts()]
         if (recording := self._recording.status()) is not None:
             array.status.append(self._bag(recording))
         if late := self._late():
@@ -199,7 +201,7 @@ class Diagnostics:
         level = DiagnosticStatus.WARN if is_wrong else DiagnosticStatus.OK
         return self._status(f"{record.component} shadow", level, message, values)
 
-    def _rule(self, facts: RuleFacts) -> Any:
+    def _rule(self, facts: RuleFacts, held: Sequence[Any]) -> Any:
         """What cannot be made ready is told before it is needed."""
         status = facts.status
         level, message = DiagnosticStatus.OK, _standing(facts)
@@ -213,6 +215,14 @@ class Diagnostics:
             "measured": status.measured,
             "memory_bytes": facts.memory_bytes,
         }
+        for one in held:
+            if facts.name in one.rules:
+                what = f"{one.element or 'presence'} of {one.target}"
+                values |= {
+                    f"{what}: wanted": one.wanted,
+                    f"{what}: holder": one.holder,
+                    f"{what}: base": one.base,
+                }
         return self._status(f"rule {facts.name}", level, message, values)
 
     def _late(self) -> Any:

@@ -20,6 +20,7 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import MauveError, exception_text, one_line
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
+from mauve_rt.node.executor.lost_supervisors import LostSupervisors
 from mauve_rt.node.executor.mirrors import Mirrors
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
@@ -157,6 +158,7 @@ class ExecutorNode(LifecycleNode):
             control_group=self.control_group,
             query_group=query_group,
         )
+        self._lost_supervisors = LostSupervisors(self, self._runtime, services.handle, self.watch)
         silent_after_ns = round(self._settings["node_silent_after_s"] * 1e9)
         self._node_watch = NodeWatch(super().get_logger().name, silent_after_ns=silent_after_ns)
         self.create_timer(_HEALTH_S, self._tell_health, callback_group=query_group)
@@ -370,6 +372,7 @@ class ExecutorNode(LifecycleNode):
         if self._node_watch is not None:
             self._node_watch.beat()
         self._rules.beat()
+        self._lost_supervisors.look()
         self._state.look_for_hung()
         self._diagnostics.publish(error=self._state.error)
         self._topic_watch.look(self._bound.topics(), self._bound.other_types())

@@ -33,7 +33,13 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.values import Values
 from mauve_rt.errors import MauveError
 from mauve_rt.interfaces.changes import open_change_messages
-from mauve_rt.interfaces.descriptions import component_infos, realtime_status, resource_infos, step_reports
+from mauve_rt.interfaces.descriptions import (
+    component_infos,
+    held_elements,
+    realtime_status,
+    resource_infos,
+    step_reports,
+)
 from mauve_rt.interfaces.values import value_message
 from mauve_rt.model.schema import DEFAULT_MIRROR_HZ
 from mauve_rt.model.step_kinds import STEP_KINDS
@@ -182,6 +188,7 @@ class Services:
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
         response.warnings = self._warnings()
+        response.held = held_elements(self._runtime)
         return response
 
     def _list_changes(self, _request: Any, response: Any) -> Any:
@@ -241,6 +248,7 @@ class Services:
         response.instance_id = self._runtime.instance_id
         response.revision = self._runtime.revision
         response.rules = self._rules.infos()
+        response.held = held_elements(self._runtime)
         return response
 
     def _on_load_rules(self, request: Any, response: Any) -> Any:
@@ -334,6 +342,7 @@ def _reconfigure(ros: Any) -> Request:
         rule=ros.rule,
         release=ros.release,
         priority=ros.priority,
+        release_on_loss=ros.release_on_loss,
         over=ros.over,
         base=ros.base,
         **_commit(ros),

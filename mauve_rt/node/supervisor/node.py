@@ -37,6 +37,7 @@ from mauve_rt.node.shared.process import BAD_INPUT, complain
 from mauve_rt.node.shared.ros_start import RosStart
 from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_settings
 from mauve_rt.node.shared.watch import Watch
+from mauve_rt.node.supervisor.only_one import OnlyOne
 from mauve_rt.node.supervisor.settings import PARAMETERS, settings_of
 from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.remote_rules import RemoteRules
@@ -67,6 +68,7 @@ class Supervisor:
             look=self._look,
             ids=(str(uuid.uuid4()) for _ in count()),
             name=node.resolve_topic_name,
+            release_on_loss=rules_file.rules.on_supervisor_loss == "release",
         )
         latched = DurabilityPolicy.TRANSIENT_LOCAL
         self._decisions = node.create_publisher(
@@ -168,6 +170,7 @@ class Supervisor:
             rule=request.rule,
             release=request.release,
             priority=request.priority,
+            release_on_loss=request.release_on_loss,
         )
         on_reply = self.watch.guarded("the executor's reply", self._on_reply)
         self._call(client, message).add_done_callback(lambda future: on_reply(request.request_id, future))
@@ -214,13 +217,14 @@ def run_node(arguments: Sequence[str], start: RosStart, stop: threading.Event) -
     interfaces = late_peers = None
     try:
         supervisor = Supervisor(node, RulesFile(settings["rules"]))
+        only_one = OnlyOne(node, supervisor.watch, replaces=settings["replace"])
         interfaces = NetworkInterfaces(node, supervisor.watch, before=addresses)
         late_peers = LatePeers(node, supervisor.watch, start.unresolved)
         executor.add_node(node)
         discovery.log(node.get_logger())
         for remark in (*start.remarks, *remarks):
             node.get_logger().warning(remark)
-        while not stop.is_set():
+        while not stop.is_set() and only_one.may_go_on():
             try:
                 executor.spin_once(timeout_sec=_SPIN_S)
             except BaseException as error:  # noqa: BLE001 - a malformed message must not end the watch

@@ -7,7 +7,12 @@ from mauve_rt.errors import ParameterError
 from mauve_rt.node.shared.ros_arguments import parse_ros_arguments
 from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage, values_of
 
-PARAMETERS = {"rules": Setting("", "rules file")}
+PARAMETERS = {
+    "rules": Setting("", "rules file"),
+    "replace": Setting(
+        default=False, description="take the place of a supervisor of the same name that runs already"
+    ),
+}
 
 
 def settings_of(words: Sequence[str]) -> tuple[dict[str, Any], tuple[str, ...]]:
@@ -20,7 +25,9 @@ def settings_of(words: Sequence[str]) -> tuple[dict[str, Any], tuple[str, ...]]:
     arguments = parse_ros_arguments(words, node="supervisor")
     namespace = arguments.namespace or "/"
     for name in check_given(arguments, PARAMETERS, namespace=namespace):
-        raise ParameterError(f"parameter {name}: a supervisor has none of that name; known: rules")
+        raise ParameterError(
+            f"parameter {name}: a supervisor has none of that name; known: {', '.join(PARAMETERS)}"
+        )
     values = values_of(arguments.within(namespace), PARAMETERS)
     if not values["rules"]:
         raise ParameterError("parameter 'rules' is missing: --ros-args -p rules:=FILE")

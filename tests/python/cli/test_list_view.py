@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from mauve_msgs.msg import ComponentInfo, PortInfo, ResourceInfo
+from mauve_msgs.msg import ComponentInfo, HeldElement, PortInfo, ResourceInfo
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli.list_view import STATES, print_components
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
@@ -169,4 +169,23 @@ def test_mirrors_of_a_resource() -> None:
         ["publishes", "/pose"],
         ["mirrors", "/x/mirror/pose"],
         ["mirrors", "/heading"],
+    ]
+
+
+def test_what_rules_and_persons_have_their_hand_on() -> None:
+    held = [
+        HeldElement(
+            target="one",
+            element="core",
+            base="replace_core one p/Usual",
+            wanted="replace_core one p/Safe",
+            holder="rule quiet",
+            rules=["quiet"],
+        ),
+        HeldElement(target="two", element="state", base="", wanted="stop two", holder="stop"),
+    ]
+    lines = _printed(ListComponents.Response(held=held), width=200)
+    assert lines[:2] == [
+        "one: core held by rule quiet: replace_core one p/Safe; without rules: replace_core one p/Usual",
+        "two: state held by a person, who stopped it: stop two; without rules: not known",
     ]

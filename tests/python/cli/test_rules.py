@@ -135,7 +135,9 @@ def test_a_rule_that_changes_what_it_looks_at(check: Check) -> None:
     assert errors[0].startswith(
         "rules:4:5: rule 'quiet' changes the input of its own condition (one), and has no cooldown_s"
     )
-    status, _, errors = check(rule(when=own, more="    cooldown_s: 5\n"), robot=ROBOT)
+    status, _, errors = check(
+        rule(when=own, undo="    undo: {for_s: 1.0}\n", more="    cooldown_s: 5\n"), robot=ROBOT
+    )
     assert (status, errors) == (0, [])
     status, _, errors = check(rule(when=own.replace(": one", ": ona")), robot=ROBOT)
     assert "component 'ona' is unknown; did you mean one?" in errors[0]

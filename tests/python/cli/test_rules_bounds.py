@@ -5,12 +5,13 @@ from pathlib import Path
 import pytest
 from checked_rules import QUIET, ROBOT, Check, rule
 
-from mauve_rt.supervision.rule_bounds import CALLED_OFF_S, WOKEN_S, Bound, bound_of, reserve_bound_of
+from mauve_rt.supervision.rule_bounds import BUILT_S, CALLED_OFF_S, WOKEN_S, Bound, bound_of, reserve_bound_of
 from mauve_rt.supervision.rules import Rule, RulesFile
 
 PERIODS_S = {"one": 0.010, "slow": 0.100, "told": 0.0}
 SWAP = "{kind: replace_core, target: one, name: executor_tests/Backwards}"
 SLOW = SWAP.replace("one", "slow")
+BACK = "    undo: {for_s: 1.0}\n"
 
 
 def parts(out: list[str]) -> dict[str, float]:
@@ -26,7 +27,7 @@ def loaded(folder: Path, when: str, do: str = SWAP, more: str = "", name: str = 
 
 
 def test_in_the_executor(check: Check) -> None:
-    status, out, errors = check(rule(more="    for_s: 0.25\n"), robot=ROBOT)
+    status, out, errors = check(rule(more="    for_s: 0.25\n", undo=BACK), robot=ROBOT)
     assert (status, errors) == (0, [])
     assert out[-1] == "rules: 1 rule, held against robot: no error found"
     assert parts(out) == {
@@ -39,7 +40,7 @@ def test_in_the_executor(check: Check) -> None:
 
 
 def test_in_the_supervisor(check: Check) -> None:
-    status, out, errors = check(rule(more="    in: supervisor\n"), robot=ROBOT)
+    status, out, errors = check(rule(more="    in: supervisor\n", undo=BACK), robot=ROBOT)
     assert (status, errors) == (0, [])
     assert parts(out) == {
         "silence set_point": 1000.0,
@@ -107,14 +108,23 @@ def test_what_is_told_now_and_then_is_as_old_as_that(tmp_path: Path) -> None:
         assert bound.parts[1].assumed
 
 
-def test_a_rule_of_lower_rank_about_the_same_component_is_called_off(tmp_path: Path) -> None:
-    low = loaded(tmp_path, QUIET, name="low")
-    high = loaded(tmp_path, QUIET, more="    priority: 5\n", name="high")
+@pytest.mark.parametrize(
+    "higher", ["    priority: 5\n", "    safety: true\n    otherwise: stop\n    priority: 0\n"]
+)
+def test_a_rule_about_the_same_component_may_have_acted_just_before(tmp_path: Path, higher: str) -> None:
+    low = loaded(tmp_path, QUIET, name="low", more="    priority: 1\n")
+    high = loaded(tmp_path, QUIET, more=higher, name="high")
+    other = loaded(tmp_path, QUIET, SLOW, name="other")
     alone = bound_of(high, PERIODS_S).known_s
-    assert bound_of(low, PERIODS_S, beside=[low, high]).known_s == alone
-    beside = bound_of(high, PERIODS_S, beside=[low, high])
-    assert beside.known_s == pytest.approx(alone + CALLED_OFF_S)
-    assert beside.parts[-1].what == "until the action of low is called off"
+    beside = bound_of(high, PERIODS_S, beside=[low, high, other])
+    assert beside.known_s == pytest.approx(alone + CALLED_OFF_S + BUILT_S)
+    assert [part.what for part in beside.parts[-2:]] == [
+        "until the action of low is called off",
+        "until the new part is built again, where low has just acted",
+    ]
+    beneath = bound_of(low, PERIODS_S, beside=[low, high, other])
+    assert beneath.known_s == pytest.approx(alone + BUILT_S)
+    assert beneath.parts[-1].what == "until the new part is built again, where high has just acted"
 
 
 def test_rules_that_wire_commit_one_after_the_other(tmp_path: Path) -> None:
@@ -139,7 +149,7 @@ def test_a_reserve_action_waits_for_no_component(tmp_path: Path, kind: str, pati
 
 def test_a_reserve_action_is_printed_and_only_an_executor_has_one(check: Check) -> None:
     more = "    otherwise: stop\n"
-    status, out, errors = check(rule(more=more), robot=ROBOT)
+    status, out, errors = check(rule(more=more, undo=BACK), robot=ROBOT)
     assert (status, errors) == (0, [])
     said = "quiet (in the executor): otherwise at most from the cause to safe outputs: 1151.000 ms"
     assert said in out

@@ -330,6 +330,13 @@ def test_a_latched_rule_ends_by_a_reset_once_its_cause_is_gone(
     (held,) = robot.states[-1].held
     assert (held.target, held.element, held.holder) == ("counter", "core", "rule quiet")
     assert (USUAL in held.base, SAFE in held.wanted) == (True, True)
+    assert graph.ask(ListRules, f"{NODE}/list_rules").held == [held]
+    assert graph.ask(ListComponents, f"{NODE}/list_components").held == [held]
+    status = rule_health(graph)
+    graph.spin_until(lambda: status().values, "the rule in /diagnostics")
+    shown = {each.key: each.value for each in status().values}
+    assert shown["core of counter: wanted"] == held.wanted
+    assert (shown["core of counter: holder"], shown["core of counter: base"]) == ("rule quiet", held.base)
     refused = graph.ask(ResetRule, f"{NODE}/reset_rule", rule="quiet")
     assert (refused.success, refused.code) == (False, Code.CONDITION_NOT_FALSE)
     press(0.0)

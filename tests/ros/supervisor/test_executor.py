@@ -1,6 +1,7 @@
 """The supervisor and the executor as processes: a real core is replaced in flight, and back."""
 
 import os
+import random
 import signal
 import subprocess
 import sys
@@ -44,6 +45,7 @@ class Band:
         self.folder = folder
         self.decisions: list[Any] = []
         self.states: list[Any] = []
+        self.processes: list[subprocess.Popen[str]] = []  # of supervisors
         self.start_executor()
         self.start_supervisor()
         self.context = Context()
@@ -65,9 +67,14 @@ class Band:
         self.executor_process = self._start("executor", f"architecture:={architecture}")
 
     def start_supervisor(self, rules: str = RULES) -> None:
+        self.supervisor_process = self.another_supervisor(rules)
+
+    def another_supervisor(self, rules: str = RULES, *parameters: str) -> subprocess.Popen[str]:
         path = self.folder / "rules.yaml"
         path.write_text(rules, encoding="utf-8")
-        self.supervisor_process = self._start("supervisor", f"rules:={path}")
+        process = self._start("supervisor", f"rules:={path}", *parameters)
+        self.processes.append(process)
+        return process
 
     def kill_supervisor(self) -> None:
         self.supervisor_process.kill()
@@ -78,7 +85,7 @@ class Band:
         self.supervisor_process.send_signal(signal.SIGINT)
         return self.supervisor_process.communicate()[1]
 
-    def _start(self, node: str, parameter: str) -> subprocess.Popen[str]:
+    def _start(self, node: str, *parameters: str) -> subprocess.Popen[str]:
         return subprocess.Popen(
             [
                 sys.executable,
@@ -88,8 +95,7 @@ class Band:
                 "--ros-args",
                 "-r",
                 "__ns:=/band",
-                "-p",
-                parameter,
+                *(word for parameter in parameters for word in ("-p", parameter)),
             ],
             stderr=subprocess.PIPE,
             text=True,
@@ -109,7 +115,7 @@ class Band:
         return str(self.states[-1].components[0].core) if self.states else ""
 
     def close(self) -> None:
-        for process in (self.executor_process, self.supervisor_process):
+        for process in (self.executor_process, *self.processes):
             process.kill()
             process.wait()
         self.spinner.shutdown()
@@ -189,6 +195,89 @@ def test_an_executor_started_anew_while_degraded_is_as_its_file_says(band: Band)
     band.until(lambda: band.core() == "mauve_examples/Accelerando")
     assert band.said().count("adopted") == 1
     assert "undo" not in band.said()
+
+
+def cores_since(band: Band, number: int) -> set[str]:
+    """Cores that ~/state has shown since the message of this number."""
+    return {state.components[0].core for state in band.states[number:]}
+
+
+def test_a_second_supervisor_of_the_name_is_refused(band: Band):
+    band.until(lambda: "armed" in band.said())
+    second = band.another_supervisor()
+    error = second.communicate()[1]
+    assert second.returncode == 2
+    assert f"/band/supervisor runs already, process {band.supervisor_process.pid} on " in error
+    assert "-p replace:=true" in error
+    assert band.supervisor_process.poll() is None
+    band.playing = False
+    band.until(lambda: "done" in band.said())
+    assert band.core() == "mauve_examples/Accelerando"
+
+
+def test_a_supervisor_takes_the_place_of_another_and_changes_nothing(band: Band):
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.until(lambda: "done" in band.said() and band.core() == "mauve_examples/Accelerando")
+    number = len(band.states) - 1
+    first = band.supervisor_process
+    band.supervisor_process = band.another_supervisor(RULES, "replace:=true")
+    error = first.communicate()[1]
+    assert first.returncode == 0
+    assert f"/band/supervisor is replaced by process {band.supervisor_process.pid} on " in error
+    band.until(lambda: "adopted" in band.said())
+    assert cores_since(band, number) == {"mauve_examples/Accelerando"}
+    band.playing = True
+    band.until(lambda: band.core() == "mauve_examples/Metronome")
+
+
+def test_supervisors_that_are_killed_at_random_change_nothing(band: Band):
+    """MAUVE_KILLS: how many; each at another instant of the start and the work of the next one."""
+    degraded(band)
+    number = len(band.states) - 1
+    chance = random.Random(1)  # noqa: S311
+    for _ in range(int(os.environ.get("MAUVE_KILLS", "3"))):
+        band.start_supervisor()
+        end_s = time.monotonic() + chance.uniform(0.0, 3.0)
+        while time.monotonic() < end_s:
+            band.spinner.spin_once(timeout_sec=0.05)
+        band.kill_supervisor()
+    band.decisions.clear()
+    band.start_supervisor()
+    band.until(lambda: "adopted" in band.said())
+    assert cores_since(band, number) == {"mauve_examples/Accelerando"}
+    band.playing = True
+    band.until(lambda: band.core() == "mauve_examples/Metronome")
+
+
+def test_a_frozen_supervisor_is_stood_in_for_until_it_goes_on(band: Band):
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.until(lambda: "done" in band.said() and band.core() == "mauve_examples/Accelerando")
+    number = len(band.states) - 1
+    first = band.supervisor_process
+    first.send_signal(signal.SIGSTOP)
+    band.decisions.clear()
+    second = band.another_supervisor()
+    band.until(lambda: "adopted" in band.said())
+    first.send_signal(signal.SIGCONT)
+    error = second.communicate()[1]
+    assert second.returncode == 2
+    assert f"process {first.pid}" in error
+    assert first.poll() is None
+    assert cores_since(band, number) == {"mauve_examples/Accelerando"}
+
+
+def test_what_a_supervisor_has_in_force_may_end_with_it(band: Band):
+    band.end_supervisor()
+    band.decisions.clear()
+    band.start_supervisor(RULES.replace("rules:", "on_supervisor_loss: release\nrules:"))
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.until(lambda: "done" in band.said() and band.core() == "mauve_examples/Accelerando")
+    band.end_supervisor()
+    band.until(lambda: band.core() == "mauve_examples/Metronome")
+    assert not band.states[-1].active_rules
 
 
 STOP = RULES.replace(

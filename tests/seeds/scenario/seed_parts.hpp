@@ -218,6 +218,15 @@ class SeedCore : public Core<TestShell> {
   void expect(bool is_true, const std::string& what) const { expect(is_true, what.c_str()); }
 
   void compute(time_ns_t most_ns) noexcept { seeds::compute(dice_.between(0, most_ns)); }
+  /// Others that preempt it make it slower.
+  void compute_slowly(time_ns_t length_ns) noexcept {
+    shared_->slow_ns += length_ns;
+    const time_ns_t until_ns = seeds::now_ns() + length_ns;
+    const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
+    seeds::compute(length_ns);
+    const time_ns_t later_ns = seeds::now_ns() - until_ns - (seeds::outcome().stalled_ns - stalled_ns);
+    shared_->slow_ns += std::max<time_ns_t>(0, later_ns);
+  }
   /// False: it refuses. Does nothing in other hooks than its own.
   bool behave(Hook hook) {
     if (hook != manner_.hook || manner_.is_good()) return true;
@@ -245,8 +254,7 @@ class SeedCore : public Core<TestShell> {
           } else {  // about as long as the bound of some states
             const time_ns_t length_ns =
                 dice_.between(BoundedStates::kLongest - us_to_ns(60), BoundedStates::kLongest + us_to_ns(60));
-            shared_->slow_ns += length_ns;
-            seeds::compute(length_ns);
+            compute_slowly(length_ns);
           }
         } else {
           const time_ns_t length_ns = dice_.between(us_to_ns(100), ms_to_ns(8));

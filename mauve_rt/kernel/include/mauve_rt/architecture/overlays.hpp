@@ -64,8 +64,9 @@ struct OverlaySpec {
   std::string rule{};
   std::string source{};  // who runs the rule; empty: the executor itself
   std::int64_t priority{0};
-  bool safety{false};  // above all that are not, and above a person's overlay that does not name it
-  bool whole{false};   // it contributes nothing while one of its elements is taken
+  bool safety{false};            // above all that are not, and above a person's overlay that does not name it
+  bool whole{false};             // it contributes nothing while one of its elements is taken
+  bool ends_with_source{false};  // it is released when the source is gone
   std::vector<Assigned> assigns{};  // of several of one element the last one is its value
   std::vector<Assigned> leaves{};   // becomes the base at its end ...
   bool leaves_over_persons{false};  // ... else only where no person gave the element its base
