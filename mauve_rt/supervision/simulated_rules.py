@@ -1,0 +1,205 @@
+"""The rules of a file at work on a simulated executor, as they are on a real one. Knows no ROS.
+
+The executor's rules run in the native runner; the supervisor's send their requests to the executor's Control. What
+conditions hear is told from outside: by a script, or by a bag.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import count
+
+from mauve_rt._kernel import (
+    ComponentDescription,
+    RuleRunner,
+    RuleStatus,
+    SignalSpec,
+    Simulation,
+    ToldDecision,
+)
+from mauve_rt.control.control import Control
+from mauve_rt.control.no_ros import NoRos
+from mauve_rt.control.requests import Request
+from mauve_rt.control.runtime import Runtime
+from mauve_rt.control.wishes import step_of
+from mauve_rt.model.steps import Step
+from mauve_rt.supervision.decisions import Decision, decision_of
+from mauve_rt.supervision.engine_rules import rule_specs
+from mauve_rt.supervision.inventory import Inventory, ListedComponent
+from mauve_rt.supervision.remote_rules import RemoteRules
+from mauve_rt.supervision.rule import ArchitectureView, ComponentView
+from mauve_rt.supervision.rule_actions import own_rules, rule_actions
+from mauve_rt.supervision.rules import Rule, RulesFile
+from mauve_rt.supervision.stand_ins import is_stand_in
+from mauve_rt.supervision.view_signals import ViewSignals
+
+_SUPERVISOR = "supervisor"
+_LONGEST_BLIND_NS = 50_000_000  # what happens to components is noticed so much later at most
+
+
+class SimulatedRules:
+    """At work from the start on. The architecture is active."""
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        runtime: Runtime,
+        file: RulesFile,
+        decide: Callable[[Decision], None],
+        *,
+        hears_states: bool = True,
+    ) -> None:
+        """`decide` takes each decision; `hears_states`: the executor's rules hear the states of its components.
+
+        Raises:
+            ArchitectureFileError: at a step that the executor would refuse.
+            MauveError: the rules cannot be used.
+        """
+        self._simulation = simulation
+        self._runtime = runtime
+        self._decide = decide
+        self._own = own_rules(file)
+        others = [rule for rule in file.rules.rules if rule.where == "supervisor"]
+        self._control = Control(runtime, outside=NoRos())
+        specs = rule_specs(self._own, with_reserve=True)
+        self._runner = RuleRunner(runtime.host, specs, rule_actions(file, runtime), told=True)
+        self._numbers = {rule.name: number for number, rule in enumerate(others)}
+        self._requests: list[Request] = []
+        self._remote = RemoteRules(
+            others,
+            act=self._requests.append,
+            decide=decide,
+            look=self._look,
+            ids=map(str, count(1)),
+        )
+        self._view: ArchitectureView | None = None
+        self._states = ViewSignals(self._runner) if hears_states else None
+        self._runner.start()
+        self.due_ns = self.look()
+
+    def hear(self, tells: Callable[[SignalSpec], bool], value: float) -> bool:
+        """Something happened that these signals hear; whether any rule does."""
+        now_ns = self._simulation.now_ns()
+        found = False
+        for engine in (self._runner.signals, self._remote.signals):
+            for number, signal in enumerate(engine):
+                if not tells(signal):
+                    continue
+                found = True
+                if engine is self._remote.signals:
+                    self._remote.hear(number, now_ns, value)
+                else:
+                    self._runner.tell(number, now_ns, value)
+        return found
+
+    def run_until(self, instant_ns: int) -> None:
+        """Let time pass; the rules act when it is time."""
+        while self._simulation.now_ns() < instant_ns:
+            now_ns = self._simulation.now_ns()
+            until_ns = min(instant_ns, max(self.due_ns, now_ns), now_ns + _LONGEST_BLIND_NS)
+            revision = self._runtime.kernel_revision()
+            self._simulation.run_until(until_ns)
+            if until_ns >= self.due_ns or self._runtime.kernel_revision() != revision:
+                self.look()
+
+    def look(self) -> int:
+        """Decide and act on what is due; when to do it again at the latest."""
+        while True:
+            due_ns = self._runner.advance()
+            for told in self._runner.wait_told(0):
+                self._decide(self._decision(told))
+            is_news = self._show()
+            due_ns = min(due_ns, self._remote.tick(self._simulation.now_ns()))
+            if not self._carry_out() and not is_news:
+                self.due_ns = due_ns
+                return due_ns
+
+    def status(self, rule: str) -> RuleStatus:
+        """How it fares."""
+        if rule in self._numbers:
+            return self._remote.status(self._numbers[rule])
+        return next(facts.status for facts in self._runner.facts() if facts.name == rule)
+
+    def is_so(self, rule: str) -> bool:
+        """Whether the architecture is as an active rule wants it; false where others have taken all of that."""
+        overlays = self._runtime.architecture.overlays
+        found = overlays.find(rule)
+        if found is None or not found.is_active:
+            return False
+        if overlays.steps_if(found, True, self._runtime.architecture.describe()):
+            return False
+        wanted = (overlays.wanted(step) for step in found.assigns)
+        return any(each.by == "rule" and each.rule == rule for each in wanted)
+
+    # ---- the executor's rules
+
+    def _decision(self, told: ToldDecision) -> Decision:
+        made = told.decision
+        rule = self._own[made.rule]
+        return decision_of(
+            made,
+            self._own,
+            failure=told.failure,
+            reason=_what_was_done(rule, told),
+            revision=self._runtime.revision,
+            message=self._problem(rule.name) if made.decision == "suppressed" else "",
+        )
+
+    def _problem(self, rule: str) -> str:
+        return next(facts.problem for facts in self._runner.facts() if facts.name == rule)
+
+    # ---- the supervisor's
+
+    def _carry_out(self) -> bool:
+        """Whether there was something to carry out."""
+        requests, self._requests[:] = list(self._requests), []
+        for request in requests:
+            outcome = self._control.handle(replace(request, requested_by=_SUPERVISOR))
+            self._remote.on_outcome(self._simulation.now_ns(), request.request_id, outcome)
+        return bool(requests)
+
+    def _show(self) -> bool:
+        """As ~/state; whether it has changed."""
+        observed = self._runtime.observe()
+        shown = {part.name: ComponentView(part.state, part.core) for part in observed.components}
+        active = frozenset(overlay.rule for overlay in self._runtime.architecture.overlays.active())
+        names = frozenset(rule.name for rule in self._own)
+        view = ArchitectureView(
+            self._runtime.instance_id, observed.revision, shown, rules=names, active=active
+        )
+        before, self._view = self._view, view
+        if view == before:
+            return False
+        now_ns = self._simulation.now_ns()
+        if self._states is not None:
+            self._states.tell(now_ns, before, view)
+        self._remote.on_state(now_ns, view)
+        return True
+
+    def _look(self) -> None:
+        """As ~/list_components."""
+        listed = {part.name: _listed(part) for part in self._runtime.components()}
+        inventory = Inventory(self._runtime.instance_id, listed, frozenset(self._runtime.resources()))
+        self._remote.on_inventory(self._simulation.now_ns(), inventory)
+
+
+def _what_was_done(rule: Rule, told: ToldDecision) -> str:
+    """As the executor says it; empty: in the words of the rule."""
+    made = told.decision
+    if made.decision != "done" or made.act == "otherwise":
+        return ""
+    known = (*rule.do, *rule.steps("undo"))
+    steps: list[Step] = [step_of(step, known) for step in told.steps]
+    return "" if any(map(is_stand_in, steps)) else f"{made.act}: {', '.join(map(str, steps))}"
+
+
+def _listed(part: ComponentDescription) -> ListedComponent:
+    return ListedComponent(
+        state=part.state,
+        shell=part.shell,
+        core=part.core,
+        fsm=part.fsm,
+        properties={item.name: str(item.value) for item in part.properties},
+        connections={
+            port.name: f"{port.resource}.{port.service}" if port.resource else "" for port in part.ports
+        },
+    )
