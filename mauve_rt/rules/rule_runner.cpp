@@ -243,14 +243,22 @@ std::vector<SignalSpec> RuleRunner::signals() const {
   return all;
 }
 
-void RuleRunner::tell(std::size_t signal, time_ns_t time_ns, double value) {
+bool RuleRunner::tell(std::size_t signal, time_ns_t time_ns, double value) {
   const auto all = engine_->signals();
   if (inputs_ != Inputs::told || !host_.is_simulated() || signal >= all.size()) {
     throw Error(ErrorCode::invalid_argument, "the rules cannot be told that",
                 {.element = "signal " + std::to_string(signal),
                  .expected = "a signal of rules that are told, in virtual time"});
   }
+  const std::uint32_t word =
+      engine_->word().load(std::memory_order_relaxed);  // relaxed: no other thread is at work
   all[signal].signal->tell(time_ns, value);
+  return engine_->word().load(std::memory_order_relaxed) != word;  // relaxed: the same
+}
+
+void RuleRunner::adopt(std::size_t rule) {
+  MAUVE_EXPECTS(inputs_ == Inputs::told && host_.is_simulated() && rule < rules_.size());
+  engine_->adopt(rule, true, clock_.now_ns());
 }
 
 time_ns_t RuleRunner::advance() {

@@ -1,10 +1,10 @@
 """The rules of a file at work on a simulated executor, as they are on a real one. Knows no ROS.
 
-The executor's rules run in the native runner; the supervisor's send their requests to the executor's Control. What
-conditions hear is told from outside: by a script, or by a bag.
+The executor's rules run in the native runner; the supervisor's send their requests to the executor's Control.
+A script, or a bag, tells their conditions what they hear.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from itertools import count
 
@@ -12,9 +12,9 @@ from mauve_rt._kernel import (
     ComponentDescription,
     RuleRunner,
     RuleStatus,
-    SignalSpec,
     Simulation,
     ToldDecision,
+    Transaction,
 )
 from mauve_rt.control.control import Control
 from mauve_rt.control.no_ros import NoRos
@@ -46,9 +46,12 @@ class SimulatedRules:
         file: RulesFile,
         decide: Callable[[Decision], None],
         *,
+        left_out: Collection[str] = (),
         hears_states: bool = True,
     ) -> None:
-        """`decide` takes each decision; `hears_states`: the executor's rules hear the states of its components.
+        """`decide` takes each decision; rules that are `left_out` do not run.
+
+        `hears_states`: rules of the executor hear the states and changes of its components.
 
         Raises:
             ArchitectureFileError: at a step that the executor would refuse.
@@ -57,70 +60,104 @@ class SimulatedRules:
         self._simulation = simulation
         self._runtime = runtime
         self._decide = decide
-        self._own = own_rules(file)
-        others = [rule for rule in file.rules.rules if rule.where == "supervisor"]
+        self._own = own_rules(file, left_out=left_out)
+        self._others = [
+            rule for rule in file.rules.rules if rule.where == "supervisor" and rule.name not in left_out
+        ]
         self._control = Control(runtime, outside=NoRos())
-        specs = rule_specs(self._own, with_reserve=True)
-        self._runner = RuleRunner(runtime.host, specs, rule_actions(file, runtime), told=True)
-        self._numbers = {rule.name: number for number, rule in enumerate(others)}
+        actions = rule_actions(file, runtime, left_out=left_out)
+        self._runner = RuleRunner(runtime.host, rule_specs(self._own, with_reserve=True), actions, told=True)
         self._requests: list[Request] = []
         self._remote = RemoteRules(
-            others,
+            self._others,
             act=self._requests.append,
             decide=decide,
             look=self._look,
             ids=map(str, count(1)),
         )
+        self.signals = [*self._runner.signals, *self._remote.signals]
         self._view: ArchitectureView | None = None
-        self._states = ViewSignals(self._runner) if hears_states else None
+        self._states: dict[str, str] = {}  # that components are said to be in
+        self._own_states = ViewSignals(self._runner) if hears_states else None
+        self._is_stirred = False
+        self._due_ns = 0
         self._runner.start()
-        self.due_ns = self.look()
+        self.look()
 
-    def hear(self, tells: Callable[[SignalSpec], bool], value: float) -> bool:
-        """Something happened that these signals hear; whether any rule does."""
+    def tell(self, signal: int, value: float) -> None:
+        """One of `signals` reports a value, now; look() decides."""
         now_ns = self._simulation.now_ns()
-        found = False
-        for engine in (self._runner.signals, self._remote.signals):
-            for number, signal in enumerate(engine):
-                if not tells(signal):
-                    continue
-                found = True
-                if engine is self._remote.signals:
-                    self._remote.hear(number, now_ns, value)
-                else:
-                    self._runner.tell(number, now_ns, value)
-        return found
+        inside = len(self._runner.signals)
+        if signal < inside:
+            self._is_stirred |= self._runner.tell(signal, now_ns, value)
+        else:
+            self._remote.hear(signal - inside, now_ns, value)
+
+    def set_state(self, component: str, state: str) -> None:
+        """A component runs from now on, or does not; a supervisor is told this state of it."""
+        part = next(each for each in self._runtime.components() if each.name == component)
+        runs = part.state == "RUNNING"
+        self._states[component] = state
+        if runs != (state == "RUNNING"):
+            (self._runtime.host.stop if runs else self._runtime.host.start)(component)
+        self._is_stirred = True
+
+    def adopt(self, rule: str) -> None:
+        """A rule is active since before, and what it wants is in force."""
+        overlays = self._runtime.architecture.overlays
+        for number, each in enumerate(self._own):
+            overlay = overlays.find(rule)
+            if each.name != rule or overlay is None or overlay.is_active:
+                continue
+            self._runtime.architecture.follow()
+            steps = overlays.steps_if(overlay, True, self._runtime.architecture.describe())
+            overlays.set_engaged(overlay, is_engaged=True)
+            overlays.set_active(overlay, is_active=True)
+            transaction = Transaction()
+            for step in steps:
+                transaction.add(step.kind, step.target, step.name, step.value)
+            self._runtime.host.make(transaction)
+            self._runner.adopt(number)
+        for each in self._others:
+            if each.name == rule:
+                self._control.handle(
+                    Request(rule=rule, steps=tuple(each.do), priority=each.priority, requested_by=_SUPERVISOR)
+                )
+        self._is_stirred = True
 
     def run_until(self, instant_ns: int) -> None:
-        """Let time pass; the rules act when it is time."""
-        while self._simulation.now_ns() < instant_ns:
-            now_ns = self._simulation.now_ns()
-            until_ns = min(instant_ns, max(self.due_ns, now_ns), now_ns + _LONGEST_BLIND_NS)
+        """Let time pass; the rules act when they have to, at the instant not yet."""
+        while (now_ns := self._simulation.now_ns()) < instant_ns:
+            until_ns = min(instant_ns, max(self._due_ns, now_ns + 1), now_ns + _LONGEST_BLIND_NS)
             revision = self._runtime.kernel_revision()
             self._simulation.run_until(until_ns)
-            if until_ns >= self.due_ns or self._runtime.kernel_revision() != revision:
+            self._is_stirred |= self._runtime.kernel_revision() != revision
+            if until_ns < instant_ns:
                 self.look()
 
-    def look(self) -> int:
-        """Decide and act on what is due; when to do it again at the latest."""
-        while True:
+    def look(self) -> None:
+        """Decide and act on what is due, and on what was told."""
+        if not (self._is_stirred or self._remote.is_stirred or self._simulation.now_ns() >= self._due_ns):
+            return
+        is_news = True
+        while is_news:
+            self._is_stirred = False
             due_ns = self._runner.advance()
             for told in self._runner.wait_told(0):
                 self._decide(self._decision(told))
             is_news = self._show()
-            due_ns = min(due_ns, self._remote.tick(self._simulation.now_ns()))
-            if not self._carry_out() and not is_news:
-                self.due_ns = due_ns
-                return due_ns
+            self._due_ns = min(due_ns, self._remote.tick(self._simulation.now_ns()))
+            is_news = self._carry_out() or is_news
 
     def status(self, rule: str) -> RuleStatus:
         """How it fares."""
-        if rule in self._numbers:
-            return self._remote.status(self._numbers[rule])
+        for number, each in enumerate(self._others):
+            if each.name == rule:
+                return self._remote.status(number)
         return next(facts.status for facts in self._runner.facts() if facts.name == rule)
 
     def is_so(self, rule: str) -> bool:
-        """Whether the architecture is as an active rule wants it; false where others have taken all of that."""
+        """Whether the architecture is as an active rule wants it; not where others have taken all of that."""
         overlays = self._runtime.architecture.overlays
         found = overlays.find(rule)
         if found is None or not found.is_active:
@@ -160,7 +197,10 @@ class SimulatedRules:
     def _show(self) -> bool:
         """As ~/state; whether it has changed."""
         observed = self._runtime.observe()
-        shown = {part.name: ComponentView(part.state, part.core) for part in observed.components}
+        shown = {
+            part.name: ComponentView(self._states.get(part.name, part.state), part.core)
+            for part in observed.components
+        }
         active = frozenset(overlay.rule for overlay in self._runtime.architecture.overlays.active())
         names = frozenset(rule.name for rule in self._own)
         view = ArchitectureView(
@@ -170,8 +210,8 @@ class SimulatedRules:
         if view == before:
             return False
         now_ns = self._simulation.now_ns()
-        if self._states is not None:
-            self._states.tell(now_ns, before, view)
+        if self._own_states is not None:
+            self._own_states.tell(now_ns, before, view)
         self._remote.on_state(now_ns, view)
         return True
 

@@ -1,6 +1,6 @@
 """An architecture for rules that are tried without one: stand-ins for all that the rules name. Knows no ROS.
 
-Parts of a stand-in do nothing. They have the names that steps give, and exist in the registry of one runtime only.
+Their parts do nothing. They have the names that steps give, and exist in the registry of one runtime only.
 Ports read or write; one whose service has another name is taken for one that reads.
 """
 

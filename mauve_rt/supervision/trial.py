@@ -60,14 +60,16 @@ class Trial:
         self.story.append(replace(decision, time_ns=decision.time_ns - self._begin_ns))
 
     def _run(self) -> None:
-        self._sign()
+        self._look()
         for at_ns, one, value in self._samples():
             self._pass_until(at_ns)
-            self._rules.hear(one.tells, value)
-            self._rules.look()
+            for number, signal in enumerate(self._rules.signals):
+                if one.tells(signal):
+                    self._rules.tell(number, value)
             self._heard_rows[one.of][self._column()] = "-"
-            self._sign()
+            self._look()
         self._pass_until(self._end_ns)
+        self._look()
 
     def _samples(self) -> Iterator[tuple[int, Heard, float]]:
         """Instants, what is heard, values, in the order of time."""
@@ -80,14 +82,16 @@ class Trial:
             yield round(at_s * 1e9), number, value
 
     def _pass_until(self, at_ns: int) -> None:
-        """Time goes on; the rules act when they have to."""
+        """Time goes on, and each column shows how the rules stand at its end; at the instant not yet."""
         while self._now_ns < at_ns:
-            column_ns = (self._column() + 1) * self._end_ns // COLUMNS + 1
-            until_ns = min(at_ns, column_ns, max(self._rules.due_ns - self._begin_ns, self._now_ns + 1))
+            column_end_ns = (self._column() + 1) * self._end_ns // COLUMNS - 1
+            until_ns = min(at_ns, max(column_end_ns, self._now_ns + 1))
             self._rules.run_until(self._begin_ns + until_ns)
-            self._sign()
+            if until_ns < at_ns:
+                self._look()
 
-    def _sign(self) -> None:
+    def _look(self) -> None:
+        self._rules.look()
         for name, row in self._rule_rows.items():
             row[self._column()] = self._sign_of(name)
 

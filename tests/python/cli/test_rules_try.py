@@ -66,19 +66,20 @@ def test_the_executor_of_an_architecture_acts(play: Try, where: str) -> None:
 @pytest.mark.usefixtures("plugin_prefix")
 @pytest.mark.parametrize("where", ["executor", "supervisor"])
 @pytest.mark.parametrize(
-    ("old", "new", "place", "words"),
+    ("old", "new", "told"),
     [
-        ("target: one", "target: two", "5:10", "component 'two' is unknown"),
-        ("executor_tests/Backwards", "executor_tests/Backward", "5:10", "executor_tests/Backward"),
-        ("topic: set_point", "topic: set_pont", "4:29", "did you mean /set_point?"),
+        ("target: one", "target: two", ("5:10", "component 'two' is unknown")),
+        ("executor_tests/Backwards", "executor_tests/Backward", ("5:10", "executor_tests/Backward")),
+        ("topic: set_point", "topic: set_pont", ("4:29", "did you mean /set_point?")),
     ],
 )
 def test_a_name_that_the_architecture_lacks_is_refused_with_its_place(
-    play: Try, where: str, old: str, new: str, place: str, words: str
+    play: Try, where: str, old: str, new: str, told: tuple[str, str]
 ) -> None:
     rules = "mauve: 1\nrules:\n" + rule(undo="", more=f"    in: {where}\n").replace(old, new)
     status, out, error = play(rules, QUIET_SCRIPT.replace(old, new), robot=ROBOT)
     assert (status, out) == (2, "")
+    place, words = told
     assert error.startswith(f"rules:{place}: ")
     assert words in error
 

@@ -120,8 +120,11 @@ class RuleRunner {
 
   /// What the conditions listen to, one for each; several may listen to the same. [non-rt]
   std::vector<SignalSpec> signals() const;
-  /// With Inputs::told: one of signals() reports a value. A later advance() decides. [non-rt] Throws Error (invalid_argument).
-  void tell(std::size_t signal, time_ns_t time_ns, double value);
+  /// With Inputs::told: one of signals() reports a value. Whether advance() has something to decide. [non-rt]
+  /// Throws Error (invalid_argument).
+  bool tell(std::size_t signal, time_ns_t time_ns, double value);
+  /// The same: the rule is active since before, and the architecture is as it wants it. [non-rt]
+  void adopt(std::size_t rule);
   /// In virtual time: does all that is to be done now; when it has to be called again at the latest. [non-rt]
   time_ns_t advance();
 
