@@ -75,31 +75,32 @@ class SimulatedRules:
             look=self._look,
             ids=map(str, count(1)),
         )
+        self._inside = len(self._runner.signals)
         self.signals = [*self._runner.signals, *self._remote.signals]
         self._view: ArchitectureView | None = None
-        self._states: dict[str, str] = {}  # that components are said to be in
+        self._states: dict[str, str] = {}  # of components that do not run, as they are said to be
         self._own_states = ViewSignals(self._runner) if hears_states else None
         self._is_stirred = False
         self._due_ns = 0
+        self.looks = 0  # how often the rules have looked: until the next time they stand as they do
         self._runner.start()
         self.look()
 
     def tell(self, signal: int, value: float) -> None:
         """One of `signals` reports a value, now; look() decides."""
         now_ns = self._simulation.now_ns()
-        inside = len(self._runner.signals)
-        if signal < inside:
+        if signal < self._inside:
             self._is_stirred |= self._runner.tell(signal, now_ns, value)
         else:
-            self._remote.hear(signal - inside, now_ns, value)
+            self._remote.hear(signal - self._inside, now_ns, value)
 
     def set_state(self, component: str, state: str) -> None:
-        """A component runs from now on, or does not; a supervisor is told this state of it."""
-        part = next(each for each in self._runtime.components() if each.name == component)
-        runs = part.state == "RUNNING"
+        """A component that is there runs from now on, or does not; a supervisor is told this state of it."""
         self._states[component] = state
-        if runs != (state == "RUNNING"):
-            (self._runtime.host.stop if runs else self._runtime.host.start)(component)
+        for part in self._runtime.components():
+            runs = part.state == "RUNNING"
+            if part.name == component and runs != (state == "RUNNING"):
+                (self._runtime.host.stop if runs else self._runtime.host.start)(component)
         self._is_stirred = True
 
     def adopt(self, rule: str) -> None:
@@ -139,6 +140,7 @@ class SimulatedRules:
         """Decide and act on what is due, and on what was told."""
         if not (self._is_stirred or self._remote.is_stirred or self._simulation.now_ns() >= self._due_ns):
             return
+        self.looks += 1
         is_news = True
         while is_news:
             self._is_stirred = False
@@ -196,11 +198,9 @@ class SimulatedRules:
 
     def _show(self) -> bool:
         """As ~/state; whether it has changed."""
+        self._runtime.host.settle_probations()
         observed = self._runtime.observe()
-        shown = {
-            part.name: ComponentView(self._states.get(part.name, part.state), part.core)
-            for part in observed.components
-        }
+        shown = {part.name: ComponentView(self._state_of(part), part.core) for part in observed.components}
         active = frozenset(overlay.rule for overlay in self._runtime.architecture.overlays.active())
         names = frozenset(rule.name for rule in self._own)
         view = ArchitectureView(
@@ -214,6 +214,10 @@ class SimulatedRules:
             self._own_states.tell(now_ns, before, view)
         self._remote.on_state(now_ns, view)
         return True
+
+    def _state_of(self, part: ComponentDescription) -> str:
+        said = self._states.get(part.name, "RUNNING")
+        return part.state if "RUNNING" in (part.state, said) else said
 
     def _look(self) -> None:
         """As ~/list_components."""

@@ -32,7 +32,8 @@ class Trial:
         self._end_ns = round(script.lasts_s * 1e9)
         self._heard_rows = {one.of: [" "] * COLUMNS for one in script.heard}
         self._rule_rows = {rule.name: [" "] * COLUMNS for rule in file.rules.rules}
-        self._drawn = 0  # columns of the rules
+        self._signs: dict[str, str] = {}  # how the rules stand ...
+        self._drawn = 0  # ... since they looked that many times
         self._simulation = Simulation(trace=False)
         try:
             if model is None:
@@ -92,8 +93,11 @@ class Trial:
 
     def _look(self) -> None:
         self._rules.look()
-        for name, row in self._rule_rows.items():
-            row[self._column()] = self._sign_of(name)
+        if self._rules.looks != self._drawn:
+            self._drawn = self._rules.looks
+            self._signs = {name: self._sign_of(name) for name in self._rule_rows}
+        for name, sign in self._signs.items():
+            self._rule_rows[name][self._column()] = sign
 
     def _sign_of(self, name: str) -> str:
         status = self._rules.status(name)

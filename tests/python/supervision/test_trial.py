@@ -127,6 +127,27 @@ def test_a_step_that_the_executor_refuses_is_a_failure(tried: TryRules, where: s
 
 
 @pytest.mark.parametrize("where", ["executor", "supervisor"])
+def test_a_fault_that_the_script_tells_of_is_heard(tried: TryRules, where: str) -> None:
+    fault = {"name": "one", "when": {"fault": {"component": "arm"}}, "do": [core("Safe")], "in": where}
+    found = tried([fault], [{"state": "arm", "is": "FAULTED", "from_s": 5.0}])
+    assert found.of("one") == ["armed", "condition_true", "do", "done"]
+    assert found.rows["one"] == "." * 15 + "#" * 45
+
+
+@pytest.mark.parametrize("where", ["executor", "supervisor"])
+def test_what_rules_bring_about_is_heard(tried: TryRules, where: str) -> None:
+    when = {"since_change": {"component": "control", "longer_than_s": 2.0}}
+    calm = {"name": "calm", "when": when, "do": [core("Calm", "arm")], "undo": {}, "in": where}
+    found = tried([calm, rule("one", [core("Safe")])], [at(5.0)])
+    acts = [(at_s, decision) for at_s, name, decision in found.story if name == "calm"]
+    assert [each for each in acts if each[1] in ("do", "undo")] == [
+        (pytest.approx(2.0, abs=0.01), "do"),
+        (5.0, "undo"),
+        (pytest.approx(7.0, abs=0.01), "do"),
+    ]
+
+
+@pytest.mark.parametrize("where", ["executor", "supervisor"])
 def test_a_rule_of_either_process_acts_and_ends(tried: TryRules, where: str) -> None:
     found = tried([rule("one", [core("Safe")], undo={}, **{"in": where})], [at(5.0), at(8.0, 0.0)])
     assert found.of("one") == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
