@@ -15,7 +15,7 @@ from mauve_rt.control.wishes import assignment_of
 from mauve_rt.errors import MauveError
 from mauve_rt.model.architecture_file import ArchitectureModel, Overrides
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
-from mauve_rt.model.schema import FileModel, PropertyValue
+from mauve_rt.model.schema import FragmentModel, PropertyValue
 from mauve_rt.model.schema_errors import read_content
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
@@ -79,7 +79,7 @@ class _StandIns:
     def __init__(self, rules: Iterable[Rule]) -> None:
         self.stopped: set[str] = set()
         self._components: dict[str, dict[str, Any]] = {}
-        self._added: dict[str, Mapping[str, Any]] = {}  # sections of resources that a step adds
+        self._sections: dict[str, Mapping[str, Any]] = {}  # of resources that a step adds
         self._resources: set[str] = set()
         self._connections: dict[tuple[str, str], str] = {}
         self._shells = {_SHELL}
@@ -102,6 +102,9 @@ class _StandIns:
             self._begin_with(step)
         stops = {step.target for step in done if step.kind == "stop"}
         self.stopped |= {step.target for step in done if step.kind == "start"} - stops
+        self._added = {step.target for step in done if STEP_KINDS[step.kind].target.startswith("new")}
+        self._components = {name: each for name, each in self._components.items() if name not in self._added}
+        self.stopped -= self._added
         self._add_resources()
 
     def model(self, file: RulesFile) -> ArchitectureModel:
@@ -117,7 +120,7 @@ class _StandIns:
             ],
         }
         text = YamlFile(file.path, text=json.dumps(content))
-        return ArchitectureModel(text, read_content(FileModel, text), Overrides())
+        return ArchitectureModel(text, read_content(FragmentModel, text), Overrides())
 
     def types(self) -> set[str]:
         """Of ports."""
@@ -146,7 +149,8 @@ class _StandIns:
             elif kind.target == "new component":
                 self._note_section(_section(step))
             elif kind.target == "new resource":
-                self._added[step.target] = _section(step)
+                self._sections[step.target] = _section(step)
+                self._resources.add(step.target)
             elif kind.target == "resource":
                 self._resources.add(step.target)
 
@@ -205,10 +209,12 @@ class _StandIns:
     def _add_resources(self) -> None:
         services = [*self._connections.values(), *(each for ports in self._ports.values() for each in ports)]
         self._resources |= {service.partition(".")[0] for service in services}
-        self._resources -= set(self._added)
-        for place, service in list(self._connections.items()):
-            if service.partition(".")[0] in self._added:
-                del self._connections[place]
+        self._resources -= self._added
+        self._connections = {
+            (component, port): service
+            for (component, port), service in self._connections.items()
+            if self._added.isdisjoint((component, service.partition(".")[0]))
+        }
 
     def _type_of(self, resource: str) -> str:
         """Of the ports that connect to it."""
@@ -219,7 +225,7 @@ class _StandIns:
 
     def _port_type(self, name: str) -> str:
         resources = (service.partition(".")[0] for service in sorted(self._ports[name]))
-        types = (str(self._added[each].get("type") or "") for each in resources if each in self._added)
+        types = (str(self._sections[each].get("type") or "") for each in resources if each in self._sections)
         return next(filter(None, types), _TYPE)
 
     def _port(self, name: str) -> ReadPort[Any] | WritePort[Any]:

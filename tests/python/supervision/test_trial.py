@@ -189,6 +189,35 @@ def test_a_supervisor_adds_and_removes(tried: TryRules) -> None:
     assert found.of("add") == ["armed", "condition_true", "do", "done"]
 
 
+def test_what_a_rule_adds_is_not_there_before(tried: TryRules) -> None:
+    section = json.dumps({"shell": "p/Shell", "core": "p/New", "fsm": "p/Fsm"})
+    resource = json.dumps({"kind": "shared_data", "type": "std_msgs/msg/Empty"})
+    do = [
+        {"kind": "add_component", "target": "new", "value": section},
+        {"kind": "remove_component", "target": "old"},
+        {"kind": "remove_resource", "target": "map"},
+    ]
+    back = [
+        {"kind": "remove_component", "target": "new"},
+        {"kind": "add_component", "target": "old", "value": section},
+        {"kind": "add_resource", "target": "map", "value": resource},
+    ]
+    found = tried([rule("one", do, undo={"do": back}, **{"in": "supervisor"})], [at(5.0), at(8.0, 0.0)])
+    assert found.of("one") == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
+
+
+def test_a_shell_is_replaced_with_a_core_and_an_fsm_for_it(tried: TryRules) -> None:
+    kinds = ("replace_shell", "replace_core", "replace_fsm")
+    do = [{"kind": kind, "target": "arm", "name": f"p/{kind}"} for kind in kinds]
+    found = tried([rule("one", do, undo={})], [at(5.0), at(8.0, 0.0)])
+    assert found.of("one") == ["armed", "condition_true", "do", "done", "condition_false", "undo", "done"]
+
+
+def test_a_rule_about_no_component(tried: TryRules) -> None:
+    found = tried([rule("one", [{"kind": "remove_resource", "target": "map"}])], [at(5.0)])
+    assert found.of("one") == ["armed", "condition_true", "do", "done"]
+
+
 @pytest.mark.usefixtures("plugin_prefix")
 def test_a_real_architecture_takes_the_place_of_the_stand_ins(tried: TryRules) -> None:
     do = [{"kind": "replace_core", "target": "one", "name": "executor_tests/Backwards"}]
