@@ -6,8 +6,10 @@ from dataclasses import replace
 
 from mauve_rt._kernel import Simulation
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.supervision.decisions import Decision
+from mauve_rt.supervision.rule_hearing import only_outside
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.supervision.script import Heard, Script
 from mauve_rt.supervision.simulated_rules import SimulatedRules
@@ -24,9 +26,11 @@ class Trial:
         """`model`: of the executor; without one it has stand-ins for what the rules name.
 
         Raises:
-            ArchitectureFileError: the executor cannot be built, or would refuse a step.
+            ArchitectureFileError: the executor cannot be built, or would refuse the file.
             MauveError: the executor would refuse the rules.
         """
+        if problems := list(only_outside(file)):
+            raise ArchitectureFileError(file.path, problems)
         self.story: list[Decision] = []
         self._script = script
         self._end_ns = round(script.lasts_s * 1e9)

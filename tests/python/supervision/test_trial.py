@@ -218,6 +218,14 @@ def test_a_rule_about_no_component(tried: TryRules) -> None:
     assert found.of("one") == ["armed", "condition_true", "do", "done"]
 
 
+def test_a_rule_that_the_executor_cannot_hear_is_refused(tried: TryRules) -> None:
+    peer = {"name": "one", "when": {"peer": {"executor": "b"}}, "do": [core("Safe")]}
+    gone = {"peer": "b", "is": "gone", "from_s": 5.0}
+    with pytest.raises(ArchitectureFileError, match="cannot receive another executor"):
+        tried([peer], [gone])
+    assert tried([peer | {"in": "supervisor"}], [gone]).of("one")[-1] == "done"
+
+
 @pytest.mark.usefixtures("plugin_prefix")
 def test_a_real_architecture_takes_the_place_of_the_stand_ins(tried: TryRules) -> None:
     do = [{"kind": "replace_core", "target": "one", "name": "executor_tests/Backwards"}]
