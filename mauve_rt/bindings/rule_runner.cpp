@@ -17,10 +17,11 @@ using Unlocked = py::call_guard<InterpreterUnlocked>;
 class PyRuleRunner {
  public:
   PyRuleRunner(PyHost& host, std::vector<rules::Rule> all, std::vector<rules::RuleActions> actions,
-               std::map<std::string, std::string> topics, PyRuleRunner* before)
-      : runner_(std::make_unique<rules::RuleRunner>(host.host(), std::move(all), std::move(actions),
-                                                    std::move(topics),
-                                                    before != nullptr ? before->runner_.get() : nullptr)) {
+               std::map<std::string, std::string> topics, PyRuleRunner* before, bool told)
+      : runner_(std::make_unique<rules::RuleRunner>(
+            host.host(), std::move(all), std::move(actions), std::move(topics),
+            before != nullptr ? before->runner_.get() : nullptr,
+            told ? rules::Inputs::told : rules::Inputs::architecture)) {
     living().insert(this);
   }
   ~PyRuleRunner() {
@@ -105,14 +106,15 @@ void bind_rule_runner(py::module_& module) {
 
 Raises MauveError (invalid_argument, unknown_component, unknown_resource ...) for what cannot be there.)")
       .def(py::init<PyHost&, std::vector<rules::Rule>, std::vector<rules::RuleActions>,
-                    std::map<std::string, std::string>, PyRuleRunner*>(),
+                    std::map<std::string, std::string>, PyRuleRunner*, bool>(),
            py::arg("host"), py::arg("rules"), py::arg("actions"),
            py::arg("topics") = std::map<std::string, std::string>{}, py::arg("before") = nullptr,
-           py::keep_alive<1, 2>(),
+           py::kw_only(), py::arg("told") = false, py::keep_alive<1, 2>(),
            R"(`actions`: of the rules, in their order. `topics`: topic -> the resource that is bound to it.
 
 `before`: those of the same host whose place these take, stopped: a rule that is in both, and the same,
-goes on, and what it receives in between counts. It is of no use afterwards, and as it was where this raises.)")
+goes on, and what it receives in between counts. It is of no use afterwards, and as it was where this raises.
+`told`: in virtual time tell() alone tells the conditions, not the architecture.)")
       .def(
           "start", [](PyRuleRunner& self) { self.runner().start(); }, Unlocked(),
           "Begin to watch; the host is deployed.")
@@ -139,6 +141,20 @@ goes on, and what it receives in between counts. It is of no use afterwards, and
       .def(
           "lost", [](PyRuleRunner& self) { return self.runner().lost(); },
           "Decisions that were left out, because those before them were not taken in time.")
+      .def_property_readonly(
+          "signals", [](const PyRuleRunner& self) { return self.runner().signals(); },
+          "One for each condition that listens; several may listen to the same.")
+      .def(
+          "tell",
+          [](PyRuleRunner& self, std::size_t signal, time_ns_t time_ns, double value) {
+            return self.runner().tell(signal, time_ns, value);
+          },
+          py::arg("signal"), py::arg("time_ns"), py::arg("value") = 0.0,
+          "Of rules that are told: one of `signals` reports a value. Whether advance() has something to "
+          "decide.")
+      .def(
+          "adopt", [](PyRuleRunner& self, std::size_t rule) { self.runner().adopt(rule); }, py::arg("rule"),
+          "The same: the rule is active since before, and the architecture is as it wants it.")
       .def(
           "advance", [](PyRuleRunner& self) { return self.runner().advance(); }, Unlocked(),
           "In virtual time: do all that is due now; when to call again at the latest.");

@@ -9,7 +9,7 @@ from mauve_rt.cli.bag_arguments import one_bag
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED
 
 if TYPE_CHECKING:  # loaded by those who use it only
-    from mauve_rt.supervision.rules import Rule, RulesFile
+    from mauve_rt.supervision.rules import RulesFile
     from mauve_rt.trace.reading.trace import Trace
 
 
@@ -70,12 +70,13 @@ def replay(args: argparse.Namespace) -> int:
 
     file = RulesFile(args.file)
     trace = _opened(args.bag)
-    rules = _replayable(file, trace)
+    left_out = _not_in_bag(file, trace)
+    rules = [rule for rule in file.rules.rules if rule.name not in left_out]
     if not rules:
         print(f"{args.bag}: no rule of {file.path} can be replayed", file=sys.stderr)
         return REFUSED
     told = story(trace)
-    found = compared(rules, acted_then(rules, told), replayed(rules, trace, told))
+    found = compared(rules, acted_then(rules, told), replayed(file, trace, told, left_out=left_out))
     if found:
         print(*comparison_lines(found, trace.span_ns[0]), sep="\n")
     differing = sum(not one.matches for one in found)
@@ -83,17 +84,16 @@ def replay(args: argparse.Namespace) -> int:
     return REFUSED if differing else OK
 
 
-def _replayable(file: "RulesFile", trace: "Trace") -> "list[Rule]":
-    """The rules that the bag has enough for; tells what it lacks for others."""
+def _not_in_bag(file: "RulesFile", trace: "Trace") -> set[str]:
+    """The rules that the bag has not enough for; tells what it lacks."""
     from mauve_rt.supervision.recorded_signals import RecordedSignals  # noqa: PLC0415
 
     signals = RecordedSignals(trace)
-    found = []
+    found = set()
     for rule in file.rules.rules:
         if missing := signals.missing(rule):
             print(f"not in the bag: {', '.join(missing)}: rule {rule.name} is left out", file=sys.stderr)
-        else:
-            found.append(rule)
+            found.add(rule.name)
     return found
 
 

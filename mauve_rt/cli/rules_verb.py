@@ -112,6 +112,33 @@ def _add_try(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "script", type=Path, metavar="SCRIPT", help="script of inputs over time (docs/rules.md shows one)"
     )
+    parser.add_argument(
+        "--architecture",
+        type=Path,
+        metavar="FILE",
+        help="architecture file of the executor; without it the executor has stand-ins for what rules name",
+    )
+
+
+def _checked_model(file: "RulesFile", architecture: Path | None) -> "ArchitectureModel | None":
+    """The architecture that rules are tried on.
+
+    Raises:
+        ArchitectureFileError: it cannot be used, or its executor would refuse the rules.
+    """
+    if architecture is None:
+        return None
+    from mauve_rt.model import load_architecture  # noqa: PLC0415
+    from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
+    from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
+
+    model = load_architecture(architecture)
+    if problems := [*standing_findings(file, model), *rehearsal_problems(file, model)[0]]:
+        raise ArchitectureFileError(file.path, problems)
+    return model
+
+
+_TELLING = ("refused", "failed", "suppressed")  # whose message says why
 
 
 def _try(args: argparse.Namespace) -> int:
@@ -119,10 +146,12 @@ def _try(args: argparse.Namespace) -> int:
     from mauve_rt.supervision.script import load_script  # noqa: PLC0415
     from mauve_rt.supervision.trial import LEGEND, Trial  # noqa: PLC0415
 
-    rules = RulesFile(args.file).rules.rules
-    trial = Trial(rules, load_script(args.script, rules))
+    file = RulesFile(args.file)
+    script = load_script(args.script, file.rules.rules)
+    trial = Trial(file, script, _checked_model(file, args.architecture))
     for said in trial.story:
-        print(f"{said.time_ns / 1e9:9.3f} s  {said.rule}: {said.decision}: {said.reason}")
+        why = f": {said.message}" if said.decision in _TELLING and said.message else ""
+        print(f"{said.time_ns / 1e9:9.3f} s  {said.rule}: {said.decision}: {said.reason}{why}")
     print("", *trial.timeline(), LEGEND, sep="\n")
     return OK
 

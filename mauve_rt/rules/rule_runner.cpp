@@ -67,12 +67,13 @@ bool is_outcome(const Decision& decision) noexcept {
 }  // namespace
 
 RuleRunner::RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, std::vector<RuleActions> actions,
-                       std::map<std::string, std::string> topics, RuleRunner* before)
+                       std::map<std::string, std::string> topics, RuleRunner* before, Inputs inputs)
     : host_(host),
       clock_(host.clock()),
       feeds_(before != nullptr ? before->feeds_
                                : std::make_shared<Feeds>(
                                      FeedPlace{.architecture = host.architecture(), .clock = host.clock()})),
+      inputs_(inputs),
       trace_number_(host.architecture().trace_number("(rules)")) {
   MAUVE_EXPECTS(before == nullptr || (!before->runs_ && &before->host_ == &host));
   if (actions.size() != rules.size())
@@ -89,7 +90,7 @@ RuleRunner::RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, std::v
   std::vector<std::optional<std::size_t>> same(rules_.size());  // the numbers in `before`
   for (std::size_t i = 0; before != nullptr && i < rules_.size(); ++i) same[i] = before->find(*this, i);
   feeds_->set_topics(std::move(topics));
-  open_feeds(same);
+  if (inputs_ == Inputs::architecture) open_feeds(same);
   if (before != nullptr) go_on_from(*before, same);
 }
 
@@ -234,6 +235,30 @@ void RuleRunner::stop() noexcept {
   }
   show_activity();
   tell();
+}
+
+std::vector<SignalSpec> RuleRunner::signals() const {
+  std::vector<SignalSpec> all;
+  for (const auto& heard : engine_->signals()) all.push_back(heard.spec);
+  return all;
+}
+
+bool RuleRunner::tell(std::size_t signal, time_ns_t time_ns, double value) {
+  const auto all = engine_->signals();
+  if (inputs_ != Inputs::told || !host_.is_simulated() || signal >= all.size()) {
+    throw Error(ErrorCode::invalid_argument, "the rules cannot be told that",
+                {.element = "signal " + std::to_string(signal),
+                 .expected = "a signal of rules that are told, in virtual time"});
+  }
+  const std::uint32_t word =
+      engine_->word().load(std::memory_order_relaxed);  // relaxed: no other thread is at work
+  all[signal].signal->tell(time_ns, value);
+  return engine_->word().load(std::memory_order_relaxed) != word;  // relaxed: the same
+}
+
+void RuleRunner::adopt(std::size_t rule) {
+  MAUVE_EXPECTS(inputs_ == Inputs::told && host_.is_simulated() && rule < rules_.size());
+  engine_->adopt(rule, true, clock_.now_ns());
 }
 
 time_ns_t RuleRunner::advance() {

@@ -1,14 +1,14 @@
 """Transactions tried on an architecture in virtual time, in which nothing runs. Knows no ROS."""
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from mauve_rt._kernel import Overlays, OverlaySpec, Simulation
 from mauve_rt.control import requests
 from mauve_rt.control.control import Control
+from mauve_rt.control.no_ros import NoRos
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.control.wishes import assignment_of
 from mauve_rt.errors import ArchitectureFileError, Problem
@@ -35,7 +35,7 @@ class Rehearsal:
 
     def __init__(self, runtime: SimulatedRuntime) -> None:
         self._runtime = runtime
-        self._control = Control(runtime, outside=_NoRos())
+        self._control = Control(runtime, outside=NoRos())
 
     def unobservable(self, file: RulesFile, leaf: When, topics: Mapping[str, str]) -> Problem | None:
         """As rule_hearing.unobservable(), of this executor."""
@@ -153,20 +153,3 @@ def _unobservable(executor: Rehearsal, file: RulesFile, model: ArchitectureModel
         problem = executor.unobservable(file, leaf, {topic: resource} if resource else {})
         if problem is not None:
             yield problem
-
-
-class _NoRos:
-    """Topics and services of what is added: whether the middleware takes them only an executor can tell."""
-
-    def open(self, resources: Mapping[str, Any], described: Mapping[str, Any]) -> dict[str, list[int]]:
-        del resources, described
-        return {}
-
-    def attach(self, opened: Mapping[str, list[int]]) -> None:
-        del opened
-
-    def discard(self, opened: Mapping[str, list[int]]) -> None:
-        del opened
-
-    def remove(self, resources: Iterable[str]) -> None:
-        del resources

@@ -48,20 +48,18 @@ class RemoteRules:
         look: Callable[[], None],
         ids: Iterator[str],
         name: Name = str,
-        hears_all: bool = False,
         release_on_loss: bool = False,
     ) -> None:
         """`act` asks for a transaction or its dry run, `look` for an inventory, `decide` tells.
 
         `ids` has one for each request, which the executor has never seen; `name`: the full name of a topic;
-        `hears_all`: even what is heard in the executor only; `release_on_loss`: as of Request.
+        `release_on_loss`: as of Request.
         """
         self._rules = list(rules)
         self._engine = RuleEngine(rule_specs(rules))
         self.signals = self._engine.signals
         self._watched = [
-            WatchedRule(number, rule, unobservable="" if hears_all else _unobservable(rule))
-            for number, rule in enumerate(rules)
+            WatchedRule(number, rule, unobservable=_unobservable(rule)) for number, rule in enumerate(rules)
         ]
         self._act = act
         self._decide = decide

@@ -1,20 +1,22 @@
 """Rules replayed: what they would have decided on the day of a bag. In virtual time; knows no ROS.
 
-Each action takes effect at once. An executor's rules and a supervisor's are decided apart, as they were. That
-something was in effect already when a rule was armed is taken from the bag.
+They are at work on a simulated executor, with stand-ins for what they name. The bag tells what conditions
+hear, when components ran, and which rules were active already. What persons changed then is not replayed.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import chain, groupby
-from operator import methodcaller
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from functools import partial
+from itertools import groupby
 from typing import NamedTuple
 
-from mauve_rt._kernel import ActionStep, Overlays, OverlaySpec, RuleEngine, SignalSpec
-from mauve_rt.control.wishes import assignment_of
-from mauve_rt.supervision.engine_rules import rule_specs
+from mauve_rt._kernel import Simulation
+from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.explanation import StoryEntry
 from mauve_rt.supervision.recorded_signals import RecordedSignals
-from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.rules import Rule, RulesFile
+from mauve_rt.supervision.simulated_rules import SimulatedRules
+from mauve_rt.supervision.stand_ins import StandInRuntime
+from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.trace.reading.trace import Trace
 
 TOLERANCE_NS = 100_000_000
@@ -49,25 +51,25 @@ class Compared(NamedTuple):
 
 class _Event(NamedTuple):
     time_ns: int
-    happens: Callable[[RuleEngine], None]
+    happens: Callable[[], None]
 
 
-def replayed(rules: Sequence[Rule], trace: Trace, story: Iterable[StoryEntry]) -> list[Acted]:
-    """Return the actions that rules would have begun, by time. `story`: what was decided then.
+def replayed(
+    file: RulesFile, trace: Trace, story: Iterable[StoryEntry], *, left_out: Collection[str] = ()
+) -> list[Acted]:
+    """Return the actions that the rules of a file would have begun, by time. `story`: what was decided then.
 
     Raises:
         TraceError: the bag's messages cannot be read.
+        ArchitectureFileError: an executor would refuse a step.
         MauveError: the engine refuses a rule.
 
     """
-    entries = list(story)
-    signals = RecordedSignals(trace)
-    found: list[Acted] = []
-    for where in ("executor", "supervisor"):
-        own = [rule for rule in rules if rule.where == where]
-        if own:
-            found += _run(own, signals, entries, trace.span_ns)
-    return sorted(found)
+    simulation = Simulation(trace=False)
+    try:
+        return _Replay(simulation, file, trace, left_out).acted(story)
+    finally:
+        simulation.shutdown()
 
 
 def acted_then(rules: Iterable[Rule], story: Iterable[StoryEntry]) -> list[Acted]:
@@ -101,106 +103,63 @@ def comparison_lines(found: Sequence[Compared], begin_ns: int) -> Iterator[str]:
         yield "  ".join(words + times) + mark
 
 
-class _Replayed:
-    """An engine and what its rules want of each element, without an executor: all is done at once."""
+class _Replay:
+    """One run, in a simulation of its own."""
 
-    def __init__(self, rules: Sequence[Rule]) -> None:
-        self.engine = RuleEngine(rule_specs(rules))
-        self._rules = rules
-        self._overlays = Overlays()
-        assigns = [[assignment_of(step) for step in rule.do] for rule in rules]
-        self._each = self._overlays.load(
-            "",
-            [
-                OverlaySpec(rule.name, steps, priority=rule.priority, safety=rule.safety, whole=rule.whole)
-                for rule, steps in zip(rules, assigns, strict=True)
-            ],
+    def __init__(
+        self, simulation: Simulation, file: RulesFile, trace: Trace, left_out: Collection[str]
+    ) -> None:
+        self._trace = trace
+        self._recorded = RecordedSignals(trace)
+        self._names = {rule.name for rule in file.rules.rules} - set(left_out)
+        self._found: list[Acted] = []
+        runtime = StandInRuntime(simulation, file)
+        runtime.configure()
+        runtime.activate()
+        self._components = [part.name for part in runtime.components() if part.name in trace.records]
+        for name in self._components:
+            if not self._runs_first(name):
+                runtime.host.stop(name)
+        self._later_ns = simulation.now_ns() - trace.span_ns[0]  # than in the bag
+        self._rules = SimulatedRules(
+            simulation, runtime, file, self._note, left_out=left_out, hears_states=False
         )
-        for step in chain.from_iterable(assigns):
-            self._overlays.set_base(_before(step), "")
-        self.found: list[Acted] = []
 
-    def until(self, next_ns: int, time_ns: int) -> int:
-        """Step as often as the engine asks for before an instant; returns when it asks for the next one."""
-        while next_ns < time_ns:
-            next_ns = max(self.step(next_ns), next_ns + 1)
-        return next_ns
+    def acted(self, story: Iterable[StoryEntry]) -> list[Acted]:
+        """What the rules begin."""
+        events = [*self._runs(), *self._adopted(story), *self._heard()]
+        events.sort(key=lambda event: event.time_ns)
+        for time_ns, together in groupby(events, key=lambda event: event.time_ns):
+            self._rules.run_until(time_ns + self._later_ns)
+            for event in together:
+                event.happens()
+            self._rules.look()
+        self._rules.run_until(self._trace.span_ns[1] + self._later_ns)
+        self._rules.look()
+        return sorted(self._found)
 
-    def step(self, now_ns: int) -> int:
-        """Decide at an instant until nothing more is wanted."""
-        while True:
-            self._follow()
-            next_ns = self.engine.step(now_ns)
-            self._follow()
-            pending = self.engine.pending
-            if pending is not None:
-                self.found.append(Acted(now_ns, self._rules[pending.rule].name, pending.act))
-                self.engine.begun(now_ns)
-                self.engine.ended(pending.rule, pending.act, "done", now_ns)
-            while self.engine.take() is not None:
-                pass  # what it tells of them is of no interest
-            if pending is None:
-                return next_ns
+    def _note(self, decision: Decision) -> None:
+        if decision.decision in _ACTS:
+            self._found.append(Acted(decision.time_ns - self._later_ns, decision.rule, decision.decision))
 
-    def _follow(self) -> None:
-        """A rule has nothing to do where others hold all that it wants."""
-        for number, overlay in enumerate(self._each):
-            self._overlays.set_active(overlay, is_active=self.engine.status(number).active)
-        self._overlays.settle_ended()
-        for number, overlay in enumerate(self._each):
-            for act, is_active in (("do", True), ("undo", False)):
-                left = self._overlays.steps_if(overlay, is_active)
-                if not left:
-                    self.engine.set_in_place(number, act, in_place=True)
+    def _runs_first(self, component: str) -> bool:
+        return self._recorded.states(component)[0][1] == COMPONENT_STATES["RUNNING"]
 
+    def _runs(self) -> Iterator[_Event]:
+        """Of the components, when they ran."""
+        words = {float(number): word for word, number in COMPONENT_STATES.items()}
+        for name in self._components:
+            for time_ns, state in self._recorded.states(name):
+                yield _Event(time_ns, partial(self._rules.set_state, name, words[state]))
 
-def _before(step: ActionStep) -> ActionStep:
-    """Another value of what a step sets."""
-    match step.kind:
-        case "start" | "stop":
-            return ActionStep("start" if step.kind == "stop" else "stop", step.target)
-        case "set_property":
-            return ActionStep(step.kind, step.target, step.name, "before")
-        case "connect" | "disconnect":
-            return ActionStep("connect", step.target, step.name, "what was.before")
-        case _:
-            return ActionStep(step.kind, step.target, "before")
+    def _adopted(self, story: Iterable[StoryEntry]) -> Iterator[_Event]:
+        for one in story:
+            if one.decision == "adopted" and one.rule in self._names:
+                yield _Event(one.time_ns, partial(self._rules.adopt, one.rule))
 
-
-def _run(
-    rules: list[Rule], signals: RecordedSignals, story: list[StoryEntry], span_ns: tuple[int, int]
-) -> list[Acted]:
-    replayed = _Replayed(rules)
-    engine = replayed.engine
-    events = [*_present(rules, signals), *_adopted(rules, story), *_heard(engine.signals, signals)]
-    events.sort(key=lambda event: event.time_ns)
-    begin_ns, end_ns = span_ns
-    next_ns = begin_ns
-    for time_ns, together in groupby(events, key=lambda event: event.time_ns):
-        next_ns = replayed.until(next_ns, time_ns)
-        for event in together:
-            event.happens(engine)
-        next_ns = replayed.step(time_ns)
-    replayed.until(next_ns, end_ns + 1)
-    return replayed.found
-
-
-def _present(rules: list[Rule], signals: RecordedSignals) -> Iterator[_Event]:
-    for index, rule in enumerate(rules):
-        for time_ns, present in signals.presence(rule):
-            yield _Event(time_ns, methodcaller("set_present", index, present, time_ns))
-
-
-def _adopted(rules: list[Rule], story: list[StoryEntry]) -> Iterator[_Event]:
-    places = {rule.name: index for index, rule in enumerate(rules)}
-    for one in story:
-        if one.decision == "adopted" and one.rule in places:
-            yield _Event(one.time_ns, methodcaller("adopt", places[one.rule], True, one.time_ns))
-
-
-def _heard(heard: Sequence[SignalSpec], signals: RecordedSignals) -> Iterator[_Event]:
-    for one in signals.told(heard):
-        yield _Event(one.time_ns, methodcaller("tell", one.signal, one.time_ns, one.value))
+    def _heard(self) -> Iterator[_Event]:
+        for one in self._recorded.told(self._rules.signals):
+            yield _Event(one.time_ns, partial(self._rules.tell, one.signal, one.value))
 
 
 def _side_by_side(then: list[Acted], now: list[Acted]) -> list[Compared]:

@@ -1,7 +1,7 @@
 """What rules do, as an executor makes it ready: steps in names and plain values. Knows no ROS."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 from mauve_rt._kernel import ActionStep, RuleActions
 from mauve_rt.control.limits import RequestLimits
@@ -35,9 +35,9 @@ class _Collected:
         self.steps.append(ActionStep(kind, target, name, value))
 
 
-def own_rules(file: RulesFile) -> list[Rule]:
+def own_rules(file: RulesFile, *, left_out: Collection[str] = ()) -> list[Rule]:
     """Those that the executor runs."""
-    return [rule for rule in file.rules.rules if rule.where == "executor"]
+    return [rule for rule in file.rules.rules if rule.where == "executor" and rule.name not in left_out]
 
 
 def unprepared(file: RulesFile, index: int, plugins: PluginIndex) -> Iterator[Problem]:
@@ -53,7 +53,7 @@ def unprepared(file: RulesFile, index: int, plugins: PluginIndex) -> Iterator[Pr
             yield file.problem((*place, "name"), IN_PYTHON.format(core.name), remedy=CPP_REMEDY)
 
 
-def rule_actions(file: RulesFile, runtime: Runtime) -> list[RuleActions]:
+def rule_actions(file: RulesFile, runtime: Runtime, *, left_out: Collection[str] = ()) -> list[RuleActions]:
     """Of the rules that the executor runs, held against the components that there are.
 
     Raises:
@@ -62,7 +62,7 @@ def rule_actions(file: RulesFile, runtime: Runtime) -> list[RuleActions]:
     return [
         _actions(file, index, runtime)
         for index, rule in enumerate(file.rules.rules)
-        if rule.where == "executor"
+        if rule.where == "executor" and rule.name not in left_out
     ]
 
 

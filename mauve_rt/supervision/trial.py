@@ -1,15 +1,19 @@
 """Rules tried on a script, in virtual time: what they decide, as a story and as a timeline. Knows no ROS."""
 
 import heapq
-from collections.abc import Iterator, Sequence
-from itertools import count
+from collections.abc import Iterator
+from dataclasses import replace
 
-from mauve_rt.control.requests import Request
+from mauve_rt._kernel import Simulation
+from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.model import ArchitectureModel
 from mauve_rt.supervision.decisions import Decision
-from mauve_rt.supervision.pretended_executor import PretendedExecutor
-from mauve_rt.supervision.remote_rules import RemoteRules
-from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.rule_hearing import only_outside
+from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.supervision.script import Heard, Script
+from mauve_rt.supervision.simulated_rules import SimulatedRules
+from mauve_rt.supervision.stand_ins import StandInRuntime
 
 COLUMNS = 60
 LEGEND = "heard: -   rules: ~ unknown   . false   ? true, not acted on   # in effect"
@@ -18,26 +22,35 @@ LEGEND = "heard: -   rules: ~ unknown   . false   ? true, not acted on   # in ef
 class Trial:
     """One run of a script. The story and the timeline are known when it is made."""
 
-    def __init__(self, rules: Sequence[Rule], script: Script) -> None:
+    def __init__(self, file: RulesFile, script: Script, model: ArchitectureModel | None = None) -> None:
+        """`model`: of the executor; without one it has stand-ins for what the rules name.
+
+        Raises:
+            ArchitectureFileError: the executor cannot be built, or would refuse the file.
+            MauveError: the executor would refuse the rules.
+        """
+        if problems := list(only_outside(file)):
+            raise ArchitectureFileError(file.path, problems)
         self.story: list[Decision] = []
         self._script = script
         self._end_ns = round(script.lasts_s * 1e9)
-        self._now_ns = 0
-        self._names = [rule.name for rule in rules]
         self._heard_rows = {one.of: [" "] * COLUMNS for one in script.heard}
-        self._rule_rows = {name: [" "] * COLUMNS for name in self._names}
-        self._drawn = 0  # columns of the rules
-        self._executor = PretendedExecutor(rules)
-        self._wanted: list[Request] = []
-        self._rules = RemoteRules(
-            rules,
-            act=self._wanted.append,
-            decide=self.story.append,
-            look=lambda: self._rules.on_inventory(self._now_ns, self._executor.inventory()),
-            ids=map(str, count(1)),
-            hears_all=True,
-        )
-        self._run()
+        self._rule_rows = {rule.name: [" "] * COLUMNS for rule in file.rules.rules}
+        self._signs: dict[str, str] = {}  # how the rules stand ...
+        self._drawn = 0  # ... since they looked that many times
+        self._simulation = Simulation(trace=False)
+        try:
+            if model is None:
+                runtime: SimulatedRuntime = StandInRuntime(self._simulation, file)
+            else:
+                runtime = SimulatedRuntime(self._simulation, lambda: model)
+            runtime.configure()
+            runtime.activate()
+            self._begin_ns = self._simulation.now_ns()
+            self._rules = SimulatedRules(self._simulation, runtime, file, self._note)
+            self._run()
+        finally:
+            self._simulation.shutdown()
 
     def timeline(self) -> Iterator[str]:
         """A row for each thing that is heard and each rule, over the script's time."""
@@ -48,20 +61,20 @@ class Trial:
         for name, row in rows.items():
             yield f"{name:{width}} |{''.join(row)}|"
 
+    def _note(self, decision: Decision) -> None:
+        self.story.append(replace(decision, time_ns=decision.time_ns - self._begin_ns))
+
     def _run(self) -> None:
-        self._rules.on_state(0, self._executor.view())
-        due_ns = self._tick()
+        self._look()
         for at_ns, one, value in self._samples():
-            while due_ns < at_ns:
-                due_ns = self._tick(due_ns)
-            self._move(at_ns)
-            self._hear(one, value)
-            if self._rules.is_stirred:
-                due_ns = self._tick()
-        while due_ns <= self._end_ns:
-            due_ns = self._tick(due_ns)
-        self._move(self._end_ns)
-        self._draw(COLUMNS)
+            self._pass_until(at_ns)
+            for number, signal in enumerate(self._rules.signals):
+                if one.tells(signal):
+                    self._rules.tell(number, value)
+            self._heard_rows[one.of][self._column()] = "-"
+            self._look()
+        self._pass_until(self._end_ns)
+        self._look()
 
     def _samples(self) -> Iterator[tuple[int, Heard, float]]:
         """Instants, what is heard, values, in the order of time."""
@@ -73,47 +86,36 @@ class Trial:
         for at_s, value in self._script.heard[number].samples(self._script.lasts_s):
             yield round(at_s * 1e9), number, value
 
-    def _hear(self, one: Heard, value: float) -> None:
-        for number, signal in enumerate(self._rules.signals):
-            if one.tells(signal):
-                self._rules.hear(number, self._now_ns, value)
-        self._heard_rows[one.of][self._column()] = "-"
+    def _pass_until(self, at_ns: int) -> None:
+        """Time goes on, and each column shows how the rules stand at its end; at the instant not yet."""
+        while self._now_ns < at_ns:
+            column_end_ns = (self._column() + 1) * self._end_ns // COLUMNS - 1
+            until_ns = min(at_ns, max(column_end_ns, self._now_ns + 1))
+            self._rules.run_until(self._begin_ns + until_ns)
+            if until_ns < at_ns:
+                self._look()
 
-    def _tick(self, at_ns: int = 0) -> int:
-        """Let the rules look, now or at an instant to come; when they have to look again."""
-        self._move(max(at_ns, self._now_ns))
-        due_ns = self._rules.tick(self._now_ns)
-        while self._wanted:
-            request = self._wanted.pop(0)
-            outcome = self._executor.handle(request)
-            self._rules.on_outcome(self._now_ns, request.request_id, outcome)
-            if not request.dry_run:
-                self._rules.on_state(self._now_ns, self._executor.view())
-            due_ns = self._rules.tick(self._now_ns)
-        for name, row in self._rule_rows.items():
-            row[self._column()] = self._sign(name)
-        return due_ns
+    def _look(self) -> None:
+        self._rules.look()
+        if self._rules.looks != self._drawn:
+            self._drawn = self._rules.looks
+            self._signs = {name: self._sign_of(name) for name in self._rule_rows}
+        for name, sign in self._signs.items():
+            self._rule_rows[name][self._column()] = sign
 
-    def _move(self, now_ns: int) -> None:
-        """Time goes on; until then the rules stand as they do."""
-        self._now_ns = now_ns
-        self._draw(self._column())
-
-    def _draw(self, columns: int) -> None:
-        for name, row in self._rule_rows.items():
-            for column in range(self._drawn, columns):
-                row[column] = self._sign(name)
-        self._drawn = max(self._drawn, columns)
-
-    def _sign(self, name: str) -> str:
-        status = self._rules.status(self._names.index(name))
+    def _sign_of(self, name: str) -> str:
+        status = self._rules.status(name)
         if status.in_effect:
-            return "#" if self._executor.follows(name) else "?"
+            return "#" if self._rules.is_so(name) else "?"
         if not status.armed:
             return " "
         if not status.known:
             return "~"
         return "?" if status.holds else "."
+
+    @property
+    def _now_ns(self) -> int:
+        return self._simulation.now_ns() - self._begin_ns
 
     def _column(self) -> int:
         return min(int(self._now_ns / self._end_ns * COLUMNS), COLUMNS - 1)

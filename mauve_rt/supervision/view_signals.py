@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from mauve_rt._kernel import RuleEngine, SignalSpec
+from mauve_rt._kernel import RuleEngine, RuleRunner, SignalSpec
 from mauve_rt.supervision.rule import ArchitectureView
 
 # Numbers of the kernel's ComponentState; mauve_msgs/msg/ComponentInfo has the same.
@@ -16,9 +16,9 @@ COMPONENT_STATES: Mapping[str, int] = {
 
 
 class ViewSignals:
-    """The signals of an engine that tell of states and changes."""
+    """The signals of an engine, or of a runner that is told, about states and changes."""
 
-    def __init__(self, engine: RuleEngine) -> None:
+    def __init__(self, engine: RuleEngine | RuleRunner) -> None:
         self._engine = engine
         heard = list(enumerate(engine.signals))
         self._states = [(number, spec) for number, spec in heard if spec.kind == "state"]

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from checked_rules import QUIET, ROBOT, rule
 
 from mauve_rt.cli.main import main
 
@@ -20,10 +21,11 @@ Try = Callable[..., tuple[int, str, str]]
 def play(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Try:
     """play(rules, script): status, stdout and stderr, the latter without the folder's name."""
 
-    def run(rules: str = RULES, script: str = SCRIPT) -> tuple[int, str, str]:
-        (tmp_path / "rules").write_text(rules, encoding="utf-8")
-        (tmp_path / "script").write_text(script, encoding="utf-8")
-        status = main(["rules", "try", str(tmp_path / "rules"), str(tmp_path / "script")])
+    def run(rules: str = RULES, script: str = SCRIPT, *, robot: str = "") -> tuple[int, str, str]:
+        for name, text in (("rules", rules), ("script", script), ("robot", robot)):
+            (tmp_path / name).write_text(text, encoding="utf-8")
+        command = ["rules", "try", str(tmp_path / "rules"), str(tmp_path / "script")]
+        status = main(command + (["--architecture", str(tmp_path / "robot")] if robot else []))
         said = capsys.readouterr()
         return status, said.out, said.err.replace(f"{tmp_path}/", "")
 
@@ -47,6 +49,57 @@ def test_each_line_of_a_script_tells_of_its_own(play: Try) -> None:
         assert status == 0
         assert "5.000 s  estop: condition_true: data of stop is 1" in out
         assert "hot: condition_true" not in out
+
+
+QUIET_SCRIPT = "mauve: 1\nlasts_s: 4\nheard: [{topic: set_point, every_s: 0.1, until_s: 1.0}]\n"
+
+
+@pytest.mark.usefixtures("plugin_prefix")
+@pytest.mark.parametrize("where", ["executor", "supervisor"])
+def test_the_executor_of_an_architecture_acts(play: Try, where: str) -> None:
+    rules = "mauve: 1\nrules:\n" + rule(undo="", more=f"    in: {where}\n")
+    status, out, error = play(rules, QUIET_SCRIPT, robot=ROBOT)
+    assert (status, error) == (0, "")
+    assert "2.000 s  quiet: done: do: replace_core one executor_tests/Backwards" in out
+
+
+@pytest.mark.usefixtures("plugin_prefix")
+@pytest.mark.parametrize("where", ["executor", "supervisor"])
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("target: one", "target: two", ("5:10", "component 'two' is unknown")),
+        ("executor_tests/Backwards", "executor_tests/Backward", ("5:10", "executor_tests/Backward")),
+        ("topic: set_point", "topic: set_pont", ("4:29", "did you mean /set_point?")),
+    ],
+)
+def test_a_name_that_the_architecture_lacks_is_refused_with_its_place(
+    play: Try, where: str, old: str, new: str, told: tuple[str, str]
+) -> None:
+    rules = "mauve: 1\nrules:\n" + rule(undo="", more=f"    in: {where}\n").replace(old, new)
+    status, out, error = play(rules, QUIET_SCRIPT.replace(old, new), robot=ROBOT)
+    assert (status, out) == (2, "")
+    place, words = told
+    assert error.startswith(f"rules:{place}: ")
+    assert words in error
+
+
+def test_why_nothing_is_done_is_told(play: Try) -> None:
+    """The second rule would remove what the first one has connected."""
+    steps = (
+        "[{kind: connect, target: exploration, name: in, value: map.read}]",
+        "[{kind: remove_resource, target: map}]",
+    )
+    rules = "mauve: 1\nrules:\n"
+    for number, (do, limit_s) in enumerate(zip(steps, (1.0, 2.0), strict=True)):
+        when = QUIET.replace("set_point", "radio/in").replace("1.0", str(limit_s))
+        rules += rule(
+            f"r{number}", when, do=do, undo="", more=f"    in: {('executor', 'supervisor')[number]}\n"
+        )
+    status, out, _ = play(rules)
+    assert status == 0
+    assert "r1: failed: do failed: refused" in out
+    assert "resource map: the resource is still connected" in out
 
 
 def test_equal_scripts_give_equal_stories(play: Try) -> None:

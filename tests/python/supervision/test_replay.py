@@ -17,27 +17,31 @@ from mauve_rt.supervision.engine_rules import rule_specs
 from mauve_rt.supervision.explanation import StoryEntry
 from mauve_rt.supervision.recorded_signals import RecordedSignals
 from mauve_rt.supervision.replay import Acted, compared, replayed
-from mauve_rt.supervision.rules import Rule, RulesFile
+from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.reading.facts import Message
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 UNDO = "undo: {do: [{kind: replace_core, target: c, name: p/A}]}"
-RulesOf = Callable[..., list[Rule]]
+RulesOf = Callable[..., RulesFile]
 
 
 @pytest.fixture
 def rules_of(tmp_path: Path) -> RulesOf:
-    """rules_of(when, ...): a rule each, named r0, r1, ..., that replaces the core of c and undoes it."""
+    """rules_of(when, ...): a rule each, named r0, r1, ..., that replaces the core of c and undoes it.
 
-    def make(*whens: str, more: str = UNDO) -> list[Rule]:
+    `more` of each rule, or of all.
+    """
+
+    def make(*whens: str, more: str | tuple[str, ...] = UNDO) -> RulesFile:
         text = "mauve: 1\nrules:\n"
-        for index, when in enumerate(whens):
-            text += f"  - name: r{index}\n    when: {{{when}}}\n    {more}\n"
+        each = (more,) * len(whens) if isinstance(more, str) else more
+        for index, (when, its) in enumerate(zip(whens, each, strict=True)):
+            text += f"  - name: r{index}\n    when: {{{when}}}\n    {its}\n"
             text += "    do: [{kind: replace_core, target: c, name: p/B}]\n"
         (tmp_path / "rules.yaml").write_text(text, encoding="utf-8")
-        return RulesFile(tmp_path / "rules.yaml").rules.rules
+        return RulesFile(tmp_path / "rules.yaml")
 
     return make
 
@@ -73,7 +77,7 @@ def runs(cycles: int) -> Callable[[SyntheticSource], object]:
     return lambda source: run(source, "c", cycles)
 
 
-def acts(rules: list[Rule], trace: Trace, story: list[StoryEntry] | None = None) -> list[tuple[float, str]]:
+def acts(rules: RulesFile, trace: Trace, story: list[StoryEntry] | None = None) -> list[tuple[float, str]]:
     """What is done, and when in ms."""
     return [(one.time_ns / MS, one.act) for one in replayed(rules, trace, story or [])]
 
@@ -82,7 +86,7 @@ def test_silence_of_a_topic_is_acted_on_and_undone(rules_of: RulesOf, tmp_path: 
     heard = [(at_ms, None) for at_ms in (50, 100, 150, 600, 650)]
     trace = bag(tmp_path / "bag", runs(70), {"/radio/in": heard})
     rules = rules_of("silence: {topic: radio/in, type: p/msg/T, longer_than_s: 0.2}")
-    assert RecordedSignals(trace).missing(rules[0]) == []
+    assert RecordedSignals(trace).missing(rules.rules.rules[0]) == []
     assert acts(rules, trace) == [(350.000001, "do"), (600, "undo")]
 
 
@@ -129,8 +133,20 @@ def test_a_fault_is_a_state_and_ends_the_watch(rules_of: RulesOf, tmp_path: Path
 
     trace = bag(tmp_path / "bag", befalls)
     assert RecordedSignals(trace).states("c") == [(0, 0.0), (19 * MS, 2.0), (70 * MS, 5.0), (200 * MS, 2.0)]
-    (rule,) = rules_of("fault: {component: c}")
+    (rule,) = rules_of("fault: {component: c}").rules.rules
     assert RecordedSignals(trace).presence(rule) == [(19 * MS, True), (70 * MS, False), (200 * MS, True)]
+
+
+@pytest.mark.parametrize("where", ["executor", "supervisor"])
+def test_another_component_s_fault_is_acted_on(rules_of: RulesOf, tmp_path: Path, where: str) -> None:
+    source = SyntheticSource(["c", "d"], realtime_offset_ns=REALTIME_OFFSET_NS)
+    deploy(source, "c")
+    deploy(source, "d")
+    run(source, "c", 70)
+    source.add("d", Kind.FAULT, run(source, "d", 5), name="act")
+    trace = mauve_rt.trace.open(record(source, tmp_path / "bag"))
+    rules = rules_of("fault: {component: d}", more=f"{UNDO}\n    in: {where}")
+    assert acts(rules, trace) == [(70, "do")]
 
 
 def test_a_component_that_ran_when_the_bag_began_is_watched_from_then_on(
@@ -139,7 +155,7 @@ def test_a_component_that_ran_when_the_bag_began_is_watched_from_then_on(
     source = SyntheticSource(["c"])
     run(source, "c", 20)
     trace = mauve_rt.trace.open(record(source, tmp_path / "bag"))
-    (rule,) = rules_of("fault: {component: c}")
+    (rule,) = rules_of("fault: {component: c}").rules.rules
     assert RecordedSignals(trace).presence(rule) == [(trace.span_ns[0], True)]
 
 
@@ -154,7 +170,7 @@ def test_changes_are_commits_of_a_component_and_all_turns_of_the_architecture(
 
     trace = bag(tmp_path / "bag", befalls)
     rules = rules_of("since_change: {component: c, longer_than_s: 0.1}", "since_change: {longer_than_s: 0.1}")
-    signals = RuleEngine(rule_specs(rules)).signals
+    signals = RuleEngine(rule_specs(rules.rules.rules)).signals
     told = RecordedSignals(trace).told(signals)
     committed_ns = 70 * MS - PERIOD_NS // 2 + 20_000
     assert [one.time_ns for one in told if one.signal == 0] == [committed_ns]
@@ -169,7 +185,9 @@ def test_the_level_of_a_diagnostic_where_it_is_recorded(rules_of: RulesOf, tmp_p
     rules = rules_of("diagnostic: {status: motor, level: ERROR}", more="in: supervisor")
     trace = bag(tmp_path / "bag", runs(70), {"/diagnostics": [(100, told(0)), (200, told(2))]})
     assert acts(rules, trace) == [(200, "do")]
-    assert RecordedSignals(bag(tmp_path / "other", runs(5))).missing(rules[0]) == ["topic /diagnostics"]
+    assert RecordedSignals(bag(tmp_path / "other", runs(5))).missing(rules.rules.rules[0]) == [
+        "topic /diagnostics"
+    ]
 
 
 @pytest.mark.parametrize(
@@ -192,7 +210,7 @@ def test_what_a_bag_cannot_tell(rules_of: RulesOf, tmp_path: Path, when: str, mi
     source = SyntheticSource(["c", "e"])
     deploy(source, "c")
     deploy(source, "e", period_ns=0)
-    (rule,) = rules_of(when)
+    (rule,) = rules_of(when).rules.rules
     assert RecordedSignals(mauve_rt.trace.open(record(source, tmp_path / "bag"))).missing(rule) == [missing]
 
 
@@ -200,13 +218,17 @@ def test_a_rule_about_a_component_that_is_not_in_the_bag(rules_of: RulesOf, tmp_
     source = SyntheticSource(["d"])
     deploy(source, "d")
     trace = mauve_rt.trace.open(record(source, tmp_path / "bag"))
-    (rule,) = rules_of("fault: {component: d}")
+    (rule,) = rules_of("fault: {component: d}").rules.rules
     assert RecordedSignals(trace).missing(rule) == ["component c"]
 
 
-def test_what_was_in_effect_when_it_was_armed_is_undone(rules_of: RulesOf, tmp_path: Path) -> None:
+@pytest.mark.parametrize("where", ["executor", "supervisor"])
+def test_what_was_in_effect_when_it_was_armed_is_undone(
+    rules_of: RulesOf, tmp_path: Path, where: str
+) -> None:
     trace = bag(tmp_path / "bag", runs(70), {"/radio/in": [(500, None)]})
-    rules = rules_of("silence: {topic: radio/in, type: p/msg/T, longer_than_s: 9}")
+    when = "silence: {topic: radio/in, type: p/msg/T, longer_than_s: 9}"
+    rules = rules_of(when, more=f"{UNDO}\n    in: {where}")
     adopted = StoryEntry(20 * MS, "/executor", "r0", "adopted", "", "", "")
     assert acts(rules, trace) == []
     assert acts(rules, trace, [adopted]) == [(500, "undo")]
@@ -215,15 +237,13 @@ def test_what_was_in_effect_when_it_was_armed_is_undone(rules_of: RulesOf, tmp_p
 def test_an_executor_s_rules_are_not_outranked_by_a_supervisor_s(rules_of: RulesOf, tmp_path: Path) -> None:
     trace = bag(tmp_path / "bag", runs(70), {"/radio/in": [(50, None)]})
     when = "silence: {topic: radio/in, type: p/msg/T, longer_than_s: 0.1}"
-    (own,) = rules_of(when, more="")
-    (above,) = rules_of(when, more="priority: 1")
-    (supervisor_s,) = rules_of(when, more="priority: 1\n    in: supervisor")
-    assert len(acts([own, above], trace)) == 1
-    assert len(acts([own, supervisor_s], trace)) == 2
+    above, supervisor_s = "priority: 1", "priority: 1\n    in: supervisor"
+    assert len(acts(rules_of(when, when, more=("", above)), trace)) == 1
+    assert len(acts(rules_of(when, when, more=("", supervisor_s)), trace)) == 2
 
 
 def test_actions_are_compared_rule_by_rule(rules_of: RulesOf) -> None:
-    rules = rules_of("fault: {component: c}", "fault: {component: c}")
+    rules = rules_of("fault: {component: c}", "fault: {component: c}").rules.rules
     then = [Acted(100 * MS, "r0", "do"), Acted(500 * MS, "r0", "undo"), Acted(900 * MS, "r1", "do")]
     now = [Acted(150 * MS, "r0", "do"), Acted(700 * MS, "r0", "undo")]
     found = [
@@ -237,7 +257,7 @@ def test_actions_are_compared_rule_by_rule(rules_of: RulesOf) -> None:
 
 
 def test_actions_that_were_not_done_then_do_not_shift_the_others(rules_of: RulesOf) -> None:
-    rules = rules_of("fault: {component: c}")
+    rules = rules_of("fault: {component: c}").rules.rules
     then = [Acted(500 * MS, "r0", "do")]
     now = [Acted(100 * MS, "r0", "do"), Acted(300 * MS, "r0", "undo"), Acted(510 * MS, "r0", "do")]
     found = [(one.then_ns, one.replayed_ns, one.matches) for one in compared(rules, then, now)]

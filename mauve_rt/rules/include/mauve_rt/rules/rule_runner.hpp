@@ -42,6 +42,12 @@ struct Told {
       0};  // of all decisions, as they were made: one that waits for its report is told after later ones
 };
 
+/// What tells the conditions of a RuleRunner.
+enum class Inputs : std::uint8_t {
+  architecture,  // its components, resources and topics
+  told,          // the caller of tell() alone, in virtual time
+};
+
 /// How one rule fares.
 struct RuleFacts {
   std::string name{};
@@ -86,7 +92,8 @@ class RuleRunner {
   /// counts. It is of no use afterwards, and as it was where this throws. [setup]
   /// Throws Error as Feeds::open(); invalid_argument: a rule that cannot be so, a kind of step that there is not.
   RuleRunner(Host& host, std::vector<mauve::rules::Rule> rules, std::vector<RuleActions> actions,
-             std::map<std::string, std::string> topics = {}, RuleRunner* before = nullptr);
+             std::map<std::string, std::string> topics = {}, RuleRunner* before = nullptr,
+             Inputs inputs = Inputs::architecture);
   /// As stop().
   ~RuleRunner();
   RuleRunner(const RuleRunner&) = delete;
@@ -111,6 +118,13 @@ class RuleRunner {
   /// How many decisions were left out, because those before them were not taken in time. [non-rt]
   std::uint64_t lost() const;
 
+  /// What the conditions listen to, one for each; several may listen to the same. [non-rt]
+  std::vector<SignalSpec> signals() const;
+  /// With Inputs::told: one of signals() reports a value. Whether advance() has something to decide. [non-rt]
+  /// Throws Error (invalid_argument).
+  bool tell(std::size_t signal, time_ns_t time_ns, double value);
+  /// The same: the rule is active since before, and the architecture is as it wants it. [non-rt]
+  void adopt(std::size_t rule);
   /// In virtual time: does all that is to be done now; when it has to be called again at the latest. [non-rt]
   time_ns_t advance();
 
@@ -204,6 +218,7 @@ class RuleRunner {
   std::unique_ptr<Engine> engine_;
   std::vector<std::unique_ptr<Rule>> rules_;
   std::shared_ptr<Feeds> feeds_;
+  const Inputs inputs_;
   ChangeSignal work_;
   Atomic<std::uint32_t> ending_{0};
   Thread decision_thread_;
