@@ -3,7 +3,8 @@
 mauve_install_python_package(mauve_rt)
 mauve_register_package(mauve_rt)
 install(FILES package.xml DESTINATION share/mauve_rt)
-install(FILES mauve_rt/node/shared/local.xml mauve_rt/node/shared/local_udp.xml DESTINATION share/mauve_rt/dds)
+install(FILES mauve_rt/node/shared/local.xml mauve_rt/node/shared/local_udp.xml mauve_rt/node/shared/open.xml
+              mauve_rt/node/shared/open_udp.xml DESTINATION share/mauve_rt/dds)
 install(DIRECTORY mauve_rt/launch DESTINATION share/mauve_rt PATTERN "__pycache__" EXCLUDE)
 mauve_link_installed("${PROJECT_SOURCE_DIR}/mauve_rt/launch" share/mauve_rt/launch)
 # A workspace's setup files source these of every ament package, for each kind of shell: the prefix is put on

@@ -10,6 +10,8 @@ _PEERS, _SERVER = "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"
 _BEYOND = ("SUBNET", "SYSTEM_DEFAULT")
 # Profiles of Fast DDS that bind to loopback: with shared memory, and without it.
 PROFILE, UDP_PROFILE = (Path(__file__).with_name(name) for name in ("local.xml", "local_udp.xml"))
+# Those that reach further, and do not wait for a network interface: the same two.
+OPEN_PROFILE, OPEN_UDP_PROFILE = (Path(__file__).with_name(name) for name in ("open.xml", "open_udp.xml"))
 
 
 def limit_discovery() -> None:
@@ -47,9 +49,18 @@ def is_off() -> bool:
 
 
 def has_own_profile() -> bool:
-    """Whether the environment names one of the project's profiles of Fast DDS, by the user or a parent."""
+    """Whether the environment names a profile that binds to loopback, by the user or a parent."""
+    return _is_named(PROFILE, UDP_PROFILE)
+
+
+def has_open_profile() -> bool:
+    """Whether it names one of the project's that reach further."""
+    return _is_named(OPEN_PROFILE, OPEN_UDP_PROFILE)
+
+
+def _is_named(*own: Path) -> bool:
     path = os.environ.get(PROFILES, "")
-    return path != "" and any(_is_same(path, own) for own in (PROFILE, UDP_PROFILE))
+    return path != "" and any(_is_same(path, each) for each in own)
 
 
 def _is_localhost_only() -> bool:

@@ -20,6 +20,9 @@ from mauve_rt.node.shared.discovery import (
     PROFILES,
     RANGE,
     UDP_PROFILE,
+    OPEN_PROFILE,
+    OPEN_UDP_PROFILE,
+    has_open_profile,
     has_own_profile,
     is_off,
     limit_discovery,
@@ -32,6 +35,7 @@ _FILE_HERE = Path("DEFAULT_FASTRTPS_PROFILES.xml")  # which Fast DDS reads from 
 _MIDDLEWARE, _FAST_DDS = "RMW_IMPLEMENTATION", "rmw_fastrtps"
 _SELF = Path("/proc/self")
 _IPV4_DIGITS = 8
+_UDP, _NON_BLOCKING = r"<type>\s*UDPv[46]\s*</type>", r"<non_blocking_send>\s*true\s*</non_blocking_send>"
 
 
 class LoopbackError(Exception):
@@ -47,6 +51,10 @@ class Reach(NamedTuple):
     def log(self, logger: Any) -> None:
         """Write it to the log of a node."""
         (logger.warning if self.is_warning else logger.info)(self.text)
+        if waits := waiting_transport():
+            logger.warning(
+                f"a network interface that stands still can hold up every topic, those of this machine too: {waits}"
+            )
 
 
 def keep_to_this_machine() -> None:
@@ -59,7 +67,7 @@ def keep_to_this_machine() -> None:
         LoopbackError: the middleware cannot be bound so.
     """
     limit_discovery()
-    set_environment(loopback_environment())
+    set_environment(loopback_environment() or open_environment())
 
 
 def loopback_environment(*, shared_memory: bool = True) -> dict[str, str | None]:
@@ -88,10 +96,40 @@ def loopback_environment(*, shared_memory: bool = True) -> dict[str, str | None]
     return profile if is_off() else profile | {RANGE: "SYSTEM_DEFAULT", LOCALHOST_ONLY: None}
 
 
+def open_environment() -> dict[str, str | None]:
+    """The variables with which a program that reaches further does not wait for a network interface.
+
+    None where they cannot be had: with another middleware, with transports or a profile of the user's own,
+    and with the range LOCALHOST, where rmw_fastrtps adds a transport of its own.
+    """
+    is_fast_dds = (os.environ.get(_MIDDLEWARE) or _FAST_DDS).startswith(_FAST_DDS)
+    transports = os.environ.get(_TRANSPORTS) or ""
+    reaches = os.environ.get(RANGE) in ("SUBNET", "SYSTEM_DEFAULT") and not stays_on_this_machine()
+    if not is_fast_dds or not reaches or users_profile() or transports not in ("", "UDPv4"):
+        return {}
+    return {PROFILES: str(OPEN_UDP_PROFILE if transports else OPEN_PROFILE)}
+
+
+def waiting_transport() -> str:
+    """Why a send may wait for a network interface that stands still; "" where it does not."""
+    if has_own_profile() or has_open_profile():
+        return ""
+    profile = users_profile()
+    if not profile:
+        return "" if is_off() else "the transports of this program are not the project's"
+    file = profile.partition("=")[2] or profile
+    try:
+        text = Path(file).read_text("utf-8", errors="replace")
+    except OSError:
+        text = ""
+    udp, ready = (len(re.findall(pattern, text)) for pattern in (_UDP, _NON_BLOCKING))
+    return "" if udp and udp == ready else f"{profile} has no <non_blocking_send>true</non_blocking_send> for each UDP transport"
+
+
 def users_profile() -> str:
     """The user's own profile of Fast DDS, by what sets it; "" where there is none."""
     for name in (PROFILES, _OTHER_PROFILES):
-        if os.environ.get(name) and not (name == PROFILES and has_own_profile()):
+        if os.environ.get(name) and not (name == PROFILES and (has_own_profile() or has_open_profile())):
             return f"{name}={os.environ[name]}"
     return str(_FILE_HERE.absolute()) if _FILE_HERE.exists() else ""
 

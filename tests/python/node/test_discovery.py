@@ -6,14 +6,24 @@ from pathlib import Path
 import pytest
 
 from mauve_rt.node.shared import loopback
-from mauve_rt.node.shared.discovery import PROFILE, PROFILES, UDP_PROFILE, opened_by, stays_on_this_machine
-from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine, reach
+from mauve_rt.node.shared.discovery import (
+    OPEN_PROFILE,
+    OPEN_UDP_PROFILE,
+    PROFILE,
+    PROFILES,
+    UDP_PROFILE,
+    opened_by,
+    stays_on_this_machine,
+)
+from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine, reach, waiting_transport
 
 RANGE, PEERS, SERVER = "ROS_AUTOMATIC_DISCOVERY_RANGE", "ROS_STATIC_PEERS", "ROS_DISCOVERY_SERVER"
 ONLY, TRANSPORTS = "ROS_LOCALHOST_ONLY", "FASTDDS_BUILTIN_TRANSPORTS"
 OTHERS = ("FASTDDS_DEFAULT_PROFILES_FILE", "RMW_IMPLEMENTATION")
 BOUND = {RANGE: "SYSTEM_DEFAULT", PROFILES: str(PROFILE)}
 BOUND_BY_UDP = {RANGE: "SYSTEM_DEFAULT", PROFILES: str(UDP_PROFILE)}
+OPEN = {RANGE: "SUBNET", PROFILES: str(OPEN_PROFILE)}
+OPEN_BY_UDP = {RANGE: "SUBNET", PROFILES: str(OPEN_UDP_PROFILE)}
 
 
 @pytest.fixture
@@ -35,8 +45,14 @@ def environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.Monke
         ({RANGE: "LOCALHOST"}, BOUND, ""),
         ({RANGE: "LOCALHOST", TRANSPORTS: "UDPv4"}, BOUND_BY_UDP, ""),
         ({RANGE: "OFF", PEERS: "10.0.0.7"}, {RANGE: "OFF", PROFILES: str(PROFILE)}, ""),
-        ({RANGE: "SUBNET"}, {RANGE: "SUBNET"}, f"{RANGE}=SUBNET"),
-        ({RANGE: "SYSTEM_DEFAULT"}, {RANGE: "SYSTEM_DEFAULT"}, f"{RANGE}=SYSTEM_DEFAULT"),
+        ({RANGE: "SUBNET"}, OPEN, f"{RANGE}=SUBNET"),
+        ({RANGE: "SUBNET", TRANSPORTS: "UDPv4"}, OPEN_BY_UDP, f"{RANGE}=SUBNET"),
+        ({RANGE: "SUBNET", TRANSPORTS: "LARGE_DATA"}, {RANGE: "SUBNET"}, f"{RANGE}=SUBNET"),
+        (
+            {RANGE: "SYSTEM_DEFAULT"},
+            {RANGE: "SYSTEM_DEFAULT", PROFILES: str(OPEN_PROFILE)},
+            f"{RANGE}=SYSTEM_DEFAULT",
+        ),
         ({PEERS: "10.0.0.7"}, {RANGE: "LOCALHOST"}, f"{RANGE}=LOCALHOST, {PEERS}=10.0.0.7"),
         ({SERVER: "10.0.0.7:11811"}, {RANGE: "LOCALHOST"}, f"{RANGE}=LOCALHOST, {SERVER}=10.0.0.7:11811"),
         # To rcl this one is above all others.
@@ -45,6 +61,7 @@ def environment(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.Monke
         # As a parent leaves it to its children.
         (BOUND, BOUND, ""),
         (BOUND_BY_UDP, BOUND, ""),
+        (OPEN, OPEN, f"{RANGE}=SUBNET"),
     ],
 )
 def test_who_stays_on_this_machine_is_bound_to_loopback(
@@ -67,6 +84,40 @@ def test_a_profile_of_the_users_own_is_left_alone(name: str, environment: pytest
     keep_to_this_machine()
     assert os.environ[RANGE] == "LOCALHOST"
     assert os.environ[name] == "own.xml"
+
+
+@pytest.mark.parametrize("reach_of", ["LOCALHOST", "SUBNET"])
+@pytest.mark.parametrize(
+    ("profile", "waits"),
+    [
+        (PROFILE.read_text("utf-8"), False),
+        (PROFILE.read_text("utf-8") + " ", False),
+        (PROFILE.read_text("utf-8").replace("<non_blocking_send>true</non_blocking_send>", ""), True),
+        ("<dds/>", True),
+        (None, True),
+    ],
+)
+def test_a_send_that_may_wait_for_an_interface_is_warned_of(
+    reach_of: str, profile: str | None, *, waits: bool, environment: pytest.MonkeyPatch
+) -> None:
+    environment.setenv(RANGE, reach_of)
+    environment.setenv(PROFILES, "own.xml")
+    if profile is not None:
+        Path("own.xml").write_text(profile, encoding="utf-8")
+    keep_to_this_machine()
+    assert bool(waiting_transport()) == waits
+    if waits:
+        assert "own.xml has no <non_blocking_send>true" in waiting_transport()
+
+
+@pytest.mark.parametrize(("transports", "waits"), [("", False), ("UDPv4", False), ("LARGE_DATA", True)])
+def test_transports_of_the_users_own_may_wait(
+    transports: str, *, waits: bool, environment: pytest.MonkeyPatch
+) -> None:
+    environment.setenv(RANGE, "SUBNET")
+    environment.setenv(TRANSPORTS, transports)
+    keep_to_this_machine()
+    assert bool(waiting_transport()) == waits
 
 
 def test_so_is_one_in_the_current_folder(environment: pytest.MonkeyPatch) -> None:
