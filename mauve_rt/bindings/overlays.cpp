@@ -4,7 +4,6 @@
 
 #include "mauve_rt/architecture/state_file.hpp"
 #include "mauve_rt/architecture/state_keeper.hpp"
-
 #include "mauve_rt/rules/action.hpp"
 
 #include "translate.hpp"

@@ -493,11 +493,14 @@ std::vector<KeptBase> Overlays::restore(const KeptState& state, const std::set<s
     const auto& [target, name] = one.element;
     if (target.empty() || bases_.contains(one.element)) return;
     const bool is_state = name == kState;  // all start at the activation
-    change_base(one.element, is_state ? std::optional(Assignment{.kind = "start", .target = target}) : present(file, one.element),
-                {});
+    change_base(
+        one.element,
+        is_state ? std::optional(Assignment{.kind = "start", .target = target}) : present(file, one.element),
+        {});
   };
   for (OverlaySpec spec : state.active) {
-    for (const auto* steps : {&spec.assigns, &spec.leaves}) std::for_each(steps->begin(), steps->end(), base_on_file);
+    for (const auto* steps : {&spec.assigns, &spec.leaves})
+      std::for_each(steps->begin(), steps->end(), base_on_file);
     if (spec.source != kHeldStopped) spec.source = rules.contains(spec.rule) ? "" : std::string(kKept);
     auto overlay = std::make_shared<Overlay>(std::move(spec), word_);
     overlay->set_engaged(true);

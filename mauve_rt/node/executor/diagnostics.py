@@ -9,7 +9,14 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
 from mauve_rt._bridge import CallReport, TopicReport
-from mauve_rt._kernel import HELD_STOPPED, ComponentDescription, RecentMaxima, RuleFacts, ShadowRecord, allocation_counting
+from mauve_rt._kernel import (
+    HELD_STOPPED,
+    ComponentDescription,
+    RecentMaxima,
+    RuleFacts,
+    ShadowRecord,
+    allocation_counting,
+)
 from mauve_rt.control.open_changes import long_ones, open_changes
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words

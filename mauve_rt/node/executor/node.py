@@ -116,7 +116,9 @@ class ExecutorNode(LifecycleNode):
         from mauve_rt.node.executor.stop_guard import StopGuard  # noqa: PLC0415
 
         query_group = MutuallyExclusiveCallbackGroup()
-        self._diagnostics = Diagnostics(self, self._runtime, self._bound, self._recording, self._rules, self._folder)
+        self._diagnostics = Diagnostics(
+            self, self._runtime, self._bound, self._recording, self._rules, self._folder
+        )
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
         control = Control(

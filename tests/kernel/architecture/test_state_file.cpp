@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The file in which decisions outlast a restart.
-#include "mauve_rt/architecture/state_file.hpp"
-
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -12,6 +10,7 @@
 #include <limits>
 #include <string>
 
+#include "mauve_rt/architecture/state_file.hpp"
 #include "mauve_rt/base/error.hpp"
 
 namespace mauve::testing::test_state_file {

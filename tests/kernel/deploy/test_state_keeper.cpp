@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What is decided is in the file soon after, whoever decides.
-#include "mauve_rt/architecture/state_keeper.hpp"
-
 #include <unistd.h>
 
 #include "mauve_rt/architecture/state_file.hpp"
+#include "mauve_rt/architecture/state_keeper.hpp"
 
 #include "fixtures.hpp"
 

@@ -167,7 +167,9 @@ class Robot:
 
 
 @pytest.fixture
-def robot(graph: Any, start_executor: Callable[..., Any], tmp_path: Path, plugin_prefix: Path) -> Iterator[Robot]:
+def robot(
+    graph: Any, start_executor: Callable[..., Any], tmp_path: Path, plugin_prefix: Path
+) -> Iterator[Robot]:
     yield Robot(graph, start_executor, tmp_path)
 
 
@@ -267,7 +269,9 @@ def read_only(robot: Robot) -> dict[str, Any]:
 
 
 def full(robot: Robot) -> dict[str, Any]:
-    return mounted(robot, "size=64k", f"dd if=/dev/zero of={robot.file.parent}/all bs=4k count=99 2>/dev/null")
+    return mounted(
+        robot, "size=64k", f"dd if=/dev/zero of={robot.file.parent}/all bs=4k count=99 2>/dev/null"
+    )
 
 
 def no_folder(robot: Robot) -> dict[str, Any]:
@@ -339,7 +343,9 @@ def test_a_core_in_quarantine_is_not_put_in_by_a_restart(robot: Robot):
     robot.start()
     robot.process.await_output(f"in quarantine, as before the restart: replace_core counter {USUAL}")
     assert robot.stands_still(), "no other core is known"
-    robot.architecture.write_text(ROBOT.replace("alternatives", f"fallback: {SAFE}, alternatives", 1), "utf-8")
+    robot.architecture.write_text(
+        ROBOT.replace("alternatives", f"fallback: {SAFE}, alternatives", 1), "utf-8"
+    )
     robot.restart()
     robot.await_state(RUNNING)
     assert robot.component().core == SAFE

@@ -237,7 +237,8 @@ class Overlays {
   std::vector<KeptBase> restore(const KeptState& state, const std::set<std::string>& rules,
                                 const ArchitectureDescription& file);
   /// What makes the architecture so, and who wants it; without starts and stops. [non-rt]
-  std::vector<std::pair<std::string, Assignment>> restoring_steps(const ArchitectureDescription& description) const;
+  std::vector<std::pair<std::string, Assignment>> restoring_steps(
+      const ArchitectureDescription& description) const;
   /// The rule is of that source from now on, as active as it was; false: the other source has no such rule. [non-rt]
   bool move(const std::string& rule, const std::string& from, const std::string& to);
 
