@@ -45,7 +45,7 @@ class Restart:
     def configure(
         self, runtime: Runtime, rules: Iterable[str], safety: Mapping[str, Iterable[str]]
     ) -> list[Remark]:
-        """Put in force what the file holds, then follow what is decided. The architecture does not run yet.
+        """Put in force what the file holds, then follow decisions. The architecture does not run yet.
 
         `safety`: safety rules, and the components that each is about. Where the file is damaged or cannot be
         written these stay stopped.
@@ -154,9 +154,12 @@ def _make(runtime: Runtime, wanted: Sequence[tuple[str, ActionStep]]) -> list[Re
             remarks.append(Remark("error", f"{author} cannot be put in force: {why}"))
             remarks.append(_hold(runtime, rule, targets))
         else:
-            for step in steps:
-                if why := _commit(runtime, author, [step]):
-                    remarks.append(Remark("error", f"{step}, by {author} before the restart: {why}"))
+            failures = [(one, _commit(runtime, author, [one])) for one in steps]
+            remarks += [
+                Remark("error", f"{one}, by {author} before the restart: {why}")
+                for one, why in failures
+                if why
+            ]
     return remarks
 
 

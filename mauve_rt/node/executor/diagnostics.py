@@ -42,6 +42,7 @@ class Diagnostics:
         bound: BoundResources,
         recording: Recording,
         rules: OwnRules,
+        *,
         folder: StateFolder,
     ) -> None:
         self._node = node

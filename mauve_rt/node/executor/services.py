@@ -266,9 +266,9 @@ class Services:
             text = f"rule {rule} was active before the restart, and the rules file lacks it"
             return Code.CONDITION_NOT_FALSE, f"{text}; mauve rules release {rule} ends it"
         is_held = self._control.outlasted(rule, HELD_STOPPED)
-        if self._rules.is_active(rule) or not is_held:
-            if refusal := self._rules.reset(rule):
-                return Code.CONDITION_NOT_FALSE, refusal
+        is_own = self._rules.is_active(rule) or not is_held
+        if is_own and (refusal := self._rules.reset(rule)):
+            return Code.CONDITION_NOT_FALSE, refusal
         if is_held:
             outcome = self._control.end_outlasted(rule, HELD_STOPPED)
             if not outcome.success:

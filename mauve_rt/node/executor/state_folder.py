@@ -20,10 +20,10 @@ class StateFolder:
         self._rules = rules
         self._restart: Restart | None = None
         if folder:
-            from mauve_rt.control.restart import Restart  # noqa: PLC0415 - few executors keep something
+            from mauve_rt.control import restart  # noqa: PLC0415 - few executors keep something
 
             name = node.get_fully_qualified_name().strip("/").replace("/", "__")
-            self._restart = Restart(Path(folder).absolute() / f"{name}.state", forget=forget)
+            self._restart = restart.Restart(Path(folder).absolute() / f"{name}.state", forget=forget)
 
     def configure(self, runtime: Runtime) -> None:
         """Put in force what an executor of this name kept, and say so; then keep what is decided."""
