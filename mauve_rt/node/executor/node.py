@@ -117,7 +117,7 @@ class ExecutorNode(LifecycleNode):
 
         query_group = MutuallyExclusiveCallbackGroup()
         self._diagnostics = Diagnostics(
-            self, self._runtime, self._bound, self._recording, self._rules, self._folder
+            self, self._runtime, self._bound, self._recording, self._rules, folder=self._folder
         )
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
