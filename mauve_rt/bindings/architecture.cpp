@@ -196,6 +196,21 @@ element: core, fsm, shell, state, "property NAME", "port NAME"; empty: the targe
           },
           Unlocked(), "Let the overlays know what has become of the architecture.")
       .def(
+          "restore",
+          [](PyArchitecture& self, const KeptState& state, const std::set<std::string>& rules) {
+            return self.architecture.overlays().restore(state, rules, self.architecture.describe());
+          },
+          py::arg("state"), py::arg("rules"),
+          R"(Puts what was kept in force, before a deployment; the bases that the file overrules.
+
+`rules`: those that the executor has; another one stays active, of the source KEPT.)")
+      .def(
+          "restoring_steps",
+          [](PyArchitecture& self) {
+            return self.architecture.overlays().restoring_steps(self.architecture.describe());
+          },
+          "(author, step): what makes the architecture as it is wanted, without starts and stops.")
+      .def(
           "note_overlays", [](PyArchitecture& self) { self.architecture.changes().bump(); },
           "Somebody changed what is wanted.")
       .def(

@@ -12,6 +12,8 @@ Attributes:
         such an error refuses.
     NOT_MEASURED: In the place of a time that there is not, or not yet.
     STATE_TIMES: What add_component(states=...) takes for each execution state, in words.
+    KEPT: Source of overlays of rules that were active before a restart, and that the rules file lacks.
+    HELD_STOPPED: Source of overlays that keep components stopped after a restart.
     STOP_TIMEOUT_NS: How long a state may go on after a stop of all components, before its component is given up.
     TASK_SETTINGS: What add_component() takes by keyword, besides `states`.
 )";
@@ -28,6 +30,7 @@ Attributes:
   bind_transaction(module);
   bind_overlays(module);
   bind_architecture(module);
+  bind_state_keeper(module);
   bind_value_log(module);
   bind_host(module);
   bind_simulation(module);

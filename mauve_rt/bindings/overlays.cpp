@@ -2,6 +2,8 @@
 // Overlays: what each element of an architecture should be, and who wants it so.
 #include "mauve_rt/architecture/overlays.hpp"
 
+#include "mauve_rt/architecture/state_file.hpp"
+#include "mauve_rt/architecture/state_keeper.hpp"
 #include "mauve_rt/rules/action.hpp"
 
 #include "translate.hpp"
@@ -61,7 +63,7 @@ void bind_values(py::module_& module) {
       .def_readonly("rules", &HeldElement::rules, "Active ones that set it, the highest first.");
   py::class_<OverlaySpec>(module, "OverlaySpec", "What one rule wants while it is active.")
       .def(py::init([](std::string rule, const rules::ActionSteps& assigns, const rules::ActionSteps& leaves,
-                       std::int64_t priority, bool safety, bool whole, bool ends_with_source,
+                       std::int64_t priority, bool safety, bool whole, bool ends_with_source, bool latch,
                        bool leaves_over_persons) {
              return OverlaySpec{.rule = std::move(rule),
                                 .source = {},
@@ -69,14 +71,29 @@ void bind_values(py::module_& module) {
                                 .safety = safety,
                                 .whole = whole,
                                 .ends_with_source = ends_with_source,
+                                .latch = latch,
                                 .assigns = rules::assigned(assigns),
                                 .leaves = rules::assigned(leaves),
                                 .leaves_over_persons = leaves_over_persons};
            }),
            py::arg("rule"), py::arg("assigns"), py::kw_only(), py::arg("leaves") = rules::ActionSteps{},
            py::arg("priority") = 0, py::arg("safety") = false, py::arg("whole") = false,
-           py::arg("ends_with_source") = false, py::arg("leaves_over_persons") = false,
+           py::arg("ends_with_source") = false, py::arg("latch") = false,
+           py::arg("leaves_over_persons") = false,
            "`leaves`: what becomes the base at its end; else what was there before comes back.");
+  py::class_<KeptBase>(module, "KeptBase", "A base that a person chose.")
+      .def_property_readonly("step", [](const KeptBase& self) { return self.assigned.step; })
+      .def_readonly("author", &KeptBase::author);
+  py::class_<KeptState>(module, "KeptState", "What rules and persons decided, and what outlasts the process.")
+      .def(py::init<>())
+      .def_property_readonly("rules",
+                             [](const KeptState& self) {
+                               std::vector<std::string> names;
+                               for (const OverlaySpec& each : self.active) names.push_back(each.rule);
+                               return names;
+                             })
+      .def_property_readonly("rejected", [](const KeptState& self) { return steps_of(self.rejected); })
+      .def_readonly("bases", &KeptState::bases);
   py::class_<Overlay, std::shared_ptr<Overlay>>(module, "Overlay", "One rule's overlay.")
       .def_property_readonly("rule", [](const Overlay& self) { return self.spec().rule; })
       .def_property_readonly("source", [](const Overlay& self) { return self.spec().source; })
@@ -92,6 +109,11 @@ void bind_values(py::module_& module) {
 
 void bind_overlays(py::module_& module) {
   bind_values(module);
+  module.attr("KEPT") = std::string(kKept);
+  module.attr("HELD_STOPPED") = std::string(kHeldStopped);
+  module.def(
+      "read_state_file", [](const std::string& path) { return read_state_file(path); }, py::arg("path"),
+      "What an executor kept; None: there is no file. Raises MauveError: it is damaged.");
   py::class_<Overlays>(
       module, "Overlays",
       R"(What is wanted of each element: of the highest active rule that sets it, else its base.
@@ -160,8 +182,23 @@ Elements are named by a step that sets them. Raises MauveError (invalid_argument
           "forgive", [](Overlays& self, const Assignment& step) { self.forgive(assigned(step).element); },
           py::arg("step"), "End the quarantine of all values of the element.")
       .def("rejected", [](const Overlays& self) { return steps_of(self.rejected()); })
+      .def("move", &Overlays::move, py::arg("rule"), py::arg("source"), py::arg("to"),
+           "The rule is of another source from now on; False: the source has no such rule.")
       .def("start_all", &Overlays::start_all, "An activation, at which persons' stops end.")
       .def("table", &Overlays::table, "What rules or persons have their hand on, sorted.");
+}
+
+void bind_state_keeper(py::module_& module) {
+  py::class_<StateKeeper>(module, "StateKeeper",
+                          "Writes what rules and persons decided to a file, as soon as it changes.")
+      .def(py::init([](PyArchitecture& architecture, const std::string& path) {
+             return std::make_unique<StateKeeper>(architecture.architecture, path);
+           }),
+           py::arg("architecture"), py::arg("path"), py::keep_alive<1, 2>(),
+           "Bases are compared with what the architecture is now, as its file made it.")
+      .def("start", &StateKeeper::start, Unlocked(), "Write the present state, then follow it.")
+      .def("stop", &StateKeeper::stop, Unlocked())
+      .def("problem", &StateKeeper::problem, "Why the present state is not in the file; empty: it is.");
 }
 
 }  // namespace mauve::bindings

@@ -29,6 +29,7 @@ void bind_registry(py::module_& module);
 void bind_settings(py::module_& module);
 /// Registers ActionStep, Overlays and what they tell of; before Architecture.
 void bind_overlays(py::module_& module);
+void bind_state_keeper(py::module_& module);
 /// Registers Architecture and Component.
 void bind_architecture(py::module_& module);
 /// Registers StepReport, RealtimeStatus and TraceDrain.

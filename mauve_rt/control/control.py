@@ -7,6 +7,8 @@ from dataclasses import replace
 from typing import Protocol
 
 from mauve_rt._kernel import (
+    HELD_STOPPED,
+    KEPT,
     ActionStep,
     Committed,
     ComponentDescription,
@@ -162,11 +164,30 @@ class Control:
 
     def release(self, rule: str) -> Outcome:
         """End what persons put over a rule, or over all ("")."""
+        if self.outlasted(rule, KEPT):
+            return self.end_kept(rule)
         with self._changing:
             taken_off = self._runtime.architecture.overlays.take_off(rule)
             return self._wanted_again(
                 f"released: {_words_of(taken_off)}" if taken_off else "nothing is over it"
             )
+
+    def outlasted(self, rule: str, source: str) -> bool:
+        """Whether what a rule wanted before a restart is in force yet; `source`: KEPT or HELD_STOPPED."""
+        overlays = self._runtime.overlays()
+        return overlays is not None and any(each.rule == rule for each in overlays.at_work(source))
+
+    def end_kept(self, rule: str) -> Outcome:
+        """End a rule that the rules file lacks, with the stop of what it could not do."""
+        outcome = self.end_outlasted(rule, KEPT)
+        if outcome.success and self.outlasted(rule, HELD_STOPPED):
+            return self.end_outlasted(rule, HELD_STOPPED)
+        return outcome
+
+    def end_outlasted(self, rule: str, source: str) -> Outcome:
+        """What there is without it comes back."""
+        with self._changing:
+            return self._outcome(Request(rule=rule, requested_by=source, release=True))
 
     def forgive(self, component: str) -> Outcome:
         """End the quarantine of the values that were rejected of a component."""
@@ -184,7 +205,7 @@ class Control:
         architecture.note_overlays()
         failures = []
         for overlay in architecture.overlays.active():
-            if not overlay.source:
+            if overlay.source in ("", KEPT, HELD_STOPPED):
                 continue
             steps = tuple(step_of(one) for one in overlay.assigns)
             request = Request(

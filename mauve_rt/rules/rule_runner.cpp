@@ -36,6 +36,7 @@ OverlaySpec overlay_of(const mauve::rules::Rule& rule, const RuleActions& action
           .priority = rule.priority,
           .safety = rule.safety,
           .whole = actions.whole,
+          .latch = rule.latch,
           .assigns = assigned(actions.do_steps),
           .leaves = assigned(rule.undoes ? actions.undo_steps : actions.do_steps),
           .leaves_over_persons = !rule.undoes || actions.takes_over};

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <iterator>
 
+#include "mauve_rt/base/seam/futex.hpp"
+
 namespace mauve {
 
 namespace {
@@ -82,6 +84,13 @@ bool is_made_again(const Assignment& step) {
   if (replaces(step)) return !step.name.empty();
   constexpr std::array kKinds{"set_property", "connect", "disconnect", "start", "stop"};
   return std::find(kKinds.begin(), kKinds.end(), step.kind) != kKinds.end();
+}
+
+/// Elements that a restart can set again.
+bool is_kept_base(const Element& element) {
+  constexpr std::array kParts{"core", "fsm", "shell"};
+  return std::find(kParts.begin(), kParts.end(), element.name) != kParts.end() ||
+         element.name.starts_with("property ") || element.name.starts_with("port ");
 }
 
 constexpr int kLastPlace = 6;
@@ -183,6 +192,8 @@ void Overlay::set_active(bool is_active) noexcept {
   if ((before == Activity::active) == is_active) return;
   const Activity after = is_active ? Activity::active : Activity::ended;
   activity_.store(after, std::memory_order_release);
+  word_->fetch_add(1, std::memory_order_release);
+  futex_wake_all(*word_);
 }
 
 void Overlay::set_engaged(bool is_engaged) noexcept {
@@ -226,7 +237,7 @@ std::shared_ptr<Overlay> Overlays::put(const std::string& source, OverlaySpec sp
 /// One that takes the place of the rule of the same name and source, and goes on as that.
 std::shared_ptr<Overlay> Overlays::next_of(const std::string& source, OverlaySpec spec) const {
   spec.source = source;
-  auto next = std::make_shared<Overlay>(std::move(spec));
+  auto next = std::make_shared<Overlay>(std::move(spec), word_);
   for (const auto& old : all_) {
     if (old->spec().source != source || old->spec().rule != next->spec().rule) continue;
     next->activity_.store(old->activity(), std::memory_order_relaxed);  // relaxed: it is not in use yet
@@ -450,6 +461,110 @@ bool Overlays::is_covered(const Element& element) const {
                      [&](const auto& each) { return each->is_active() && each->find(element) != nullptr; });
 }
 
+// ---- over a restart
+
+void Overlays::bump() noexcept {
+  word_->fetch_add(1, std::memory_order_release);
+  futex_wake_all(*word_);
+}
+
+KeptState Overlays::kept(const ArchitectureDescription& file) const {
+  const LockGuard lock(mutex_);
+  KeptState state;
+  for (const auto& each : all_) {
+    if (each->spec().latch && each->is_active()) state.active.push_back(each->spec());
+  }
+  state.rejected = rejected_;
+  for (const auto& [element, base] : bases_) {
+    if (!base.value || !is_person(base.author) || !is_kept_base(element)) continue;
+    if (find_named(file.components, element.target) == nullptr) continue;
+    std::optional<Assignment> of_file = present(file, element);
+    if (of_file && is_same_effect(*of_file, *base.value)) continue;
+    state.bases.push_back(
+        {.assigned = {element, *base.value}, .author = base.author, .of_file = std::move(of_file)});
+  }
+  return state;
+}
+
+std::vector<KeptBase> Overlays::restore(const KeptState& state, const std::set<std::string>& rules,
+                                        const ArchitectureDescription& file) {
+  const LockGuard lock(mutex_);
+  const auto base_on_file = [&](const Assigned& one) {
+    const auto& [target, name] = one.element;
+    if (target.empty() || bases_.contains(one.element)) return;
+    const bool is_state = name == kState;  // all start at the activation
+    change_base(
+        one.element,
+        is_state ? std::optional(Assignment{.kind = "start", .target = target}) : present(file, one.element),
+        {});
+  };
+  for (OverlaySpec spec : state.active) {
+    for (const auto* steps : {&spec.assigns, &spec.leaves})
+      std::for_each(steps->begin(), steps->end(), base_on_file);
+    if (spec.source != kHeldStopped) spec.source = rules.contains(spec.rule) ? "" : std::string(kKept);
+    auto overlay = std::make_shared<Overlay>(std::move(spec), word_);
+    overlay->set_engaged(true);
+    overlay->set_active(true);
+    overlay->order_ = all_.size();
+    all_.push_back(std::move(overlay));
+  }
+  rejected_ = state.rejected;
+  std::for_each(rejected_.begin(), rejected_.end(), base_on_file);
+  std::vector<KeptBase> left_out;
+  for (const KeptBase& base : state.bases) {
+    const std::optional<Assignment> now = present(file, base.assigned.element);
+    const bool is_same = now.has_value() == base.of_file.has_value() &&
+                         (!now.has_value() || is_same_effect(*now, *base.of_file));
+    if (is_same) {
+      change_base(base.assigned.element, base.assigned.step, base.author);
+    } else {
+      left_out.push_back(base);
+    }
+  }
+  return left_out;
+}
+
+std::vector<std::pair<std::string, Assignment>> Overlays::restoring_steps(
+    const ArchitectureDescription& description) const {
+  const LockGuard lock(mutex_);
+  std::vector<Assigned> found;
+  std::map<Element, std::string> authors;
+  const auto enter = [&](const Element& element) {
+    if (element.target.empty() || element.name == kState || authors.contains(element)) return;
+    const Wanted now = wanted(element, {});
+    const auto base = bases_.find(element);
+    if (!now.step || (now.by != Wanted::By::rule && now.by != Wanted::By::base)) return;
+    authors[element] = now.by == Wanted::By::rule ? std::string(kByRule) + now.rule : base->second.author;
+    found.push_back({element, *now.step});
+  };
+  for (const Overlay* rule : ranked({})) {
+    for (const Assigned& one : rule->spec().assigns) enter(one.element);
+  }
+  for (const auto& [element, base] : bases_) enter(element);
+  std::vector<std::pair<std::string, Assignment>> steps;
+  for (const Assigned& one : differences(in_order(found), description))
+    steps.emplace_back(authors[one.element], one.step);
+  return steps;
+}
+
+bool Overlays::move(const std::string& rule, const std::string& from, const std::string& to) {
+  const LockGuard lock(mutex_);
+  for (auto& each : all_) {
+    if (each->spec().source != from || each->spec().rule != rule) continue;
+    OverlaySpec spec = each->spec();
+    spec.source = to;
+    auto moved = std::make_shared<Overlay>(std::move(spec), word_);
+    moved->activity_.store(each->activity(), std::memory_order_relaxed);  // relaxed: it is not in use yet
+    moved->engaged_.store(each->engaged(), std::memory_order_relaxed);
+    moved->given_back_ = each->given_back_;
+    moved->order_ = each->order_;
+    each = std::move(moved);
+    bump();
+    return true;
+  }
+  return false;
+}
+
 // ---- following the architecture
 
 Overlays::Look Overlays::look() const {
@@ -516,6 +631,7 @@ void Overlays::note(const Assigned& assigned, const std::string& author) {
 /// What was found out of who assigns it, is of yesterday.
 void Overlays::outdate(const Element& element) {
   ++changes_;
+  bump();
   for (const auto& each : all_) {
     if (each->find(element) == nullptr && !each->has_given_back(element)) continue;
     each->outdate(true);
@@ -594,8 +710,14 @@ void Overlays::start_all() {
   stopped_.clear();
 }
 
-bool Overlays::is_kept_stopped(const std::string& component) const {
+bool Overlays::is_kept_stopped(const std::string& component,
+                               const ArchitectureDescription& description) const {
   const LockGuard lock(mutex_);
+  for (const Assigned& one : rejected_) {
+    if (one.element.target != component) continue;
+    const std::optional<Assignment> now = present(description, one.element);
+    if (now && is_same_effect(*now, one.step)) return true;
+  }
   const Wanted found = wanted({.target = component, .name = std::string(kState)}, {});
   return found.by == Wanted::By::rule && found.step && found.step->kind == "stop";
 }
@@ -614,9 +736,10 @@ void Overlays::note_rejected(const Assigned& assigned) {
 
 /// A person asks for it: it may be put in again.
 void Overlays::pardon(const Assigned& assigned) {
-  std::erase_if(rejected_, [&](const Assigned& one) {
+  const std::size_t pardoned = std::erase_if(rejected_, [&](const Assigned& one) {
     return one.element == assigned.element && is_same_effect(one.step, assigned.step);
   });
+  if (pardoned != 0) bump();
 }
 
 void Overlays::forgive(const Element& element) {

@@ -184,10 +184,11 @@ std::uint32_t Host::wait_change(std::uint32_t seen, time_ns_t until_ns) noexcept
 void Host::start_all(time_ns_t epoch_ns) {
   architecture_.set_deployment_epoch(epoch_ns);
   architecture_.overlays().start_all();
+  const ArchitectureDescription description = architecture_.describe();
   for (const auto& component : architecture_.components()) {
     Task& task = component->task();
     const time_ns_t first = task.join(epoch_ns);
-    const bool is_to_start = !architecture_.overlays().is_kept_stopped(component->name());
+    const bool is_to_start = !architecture_.overlays().is_kept_stopped(component->name(), description);
     if (task.state() == ComponentState::stopped && is_to_start) task.start_at(first);
   }
 }

@@ -9,7 +9,14 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
 from mauve_rt._bridge import CallReport, TopicReport
-from mauve_rt._kernel import ComponentDescription, RecentMaxima, RuleFacts, ShadowRecord, allocation_counting
+from mauve_rt._kernel import (
+    HELD_STOPPED,
+    ComponentDescription,
+    RecentMaxima,
+    RuleFacts,
+    ShadowRecord,
+    allocation_counting,
+)
 from mauve_rt.control.open_changes import long_ones, open_changes
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words
@@ -18,6 +25,7 @@ from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
 from mauve_rt.node.executor.rules import OwnRules
+from mauve_rt.node.executor.state_folder import StateFolder
 from mauve_rt.supervision.truth import truth_word
 
 _ONE = ThresholdModel(warn=1)
@@ -35,12 +43,15 @@ class Diagnostics:
         bound: BoundResources,
         recording: Recording,
         rules: OwnRules,
+        *,
+        folder: StateFolder,
     ) -> None:
         self._node = node
         self._runtime = runtime
         self._bound = bound
         self._recording = recording
         self._rules = rules
+        self._folder = folder
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -57,6 +68,8 @@ class Diagnostics:
         array.status += [self._shadow(record) for record in self._runtime.shadows()]
         held = held_elements(self._runtime)
         array.status += [self._rule(facts, held) for facts in self._rules.facts()]
+        if (problem := self._folder.problem()) is not None:
+            array.status.append(self._restart(problem))
         if (recording := self._recording.status()) is not None:
             array.status.append(self._bag(recording))
         if late := self._late():
@@ -224,6 +237,17 @@ class Diagnostics:
                     f"{what}: base": one.base,
                 }
         return self._status(f"rule {facts.name}", level, message, values)
+
+    def _restart(self, problem: str) -> Any:
+        """What would not outlast a restart, and what one left stopped."""
+        overlays = self._runtime.overlays()
+        held = overlays.at_work(HELD_STOPPED) if overlays is not None else []
+        remarks = [problem] if problem else []
+        for overlay in held:
+            components = ", ".join(step.target for step in overlay.assigns)
+            remarks.append(f"stopped until mauve rules reset {overlay.rule}: {components}")
+        level = DiagnosticStatus.ERROR if remarks else DiagnosticStatus.OK
+        return self._status("state folder", level, "; ".join(remarks) or "what is decided is kept", {})
 
     def _late(self) -> Any:
         """The changes that are open for long; None: there is none."""

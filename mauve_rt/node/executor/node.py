@@ -27,6 +27,7 @@ from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
 from mauve_rt.node.executor.settings import DEFAULTS, PARAMETERS
 from mauve_rt.node.executor.state import StatePublisher
+from mauve_rt.node.executor.state_folder import StateFolder
 from mauve_rt.node.shared.service_thread import refused_reply
 from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_settings
 from mauve_rt.node.shared.settings import OF_RCLPY, refusal
@@ -97,6 +98,9 @@ class ExecutorNode(LifecycleNode):
             watch=self.watch,
         )
         self._state.rules = self._rules.names
+        self._folder = StateFolder(
+            self, self._rules, folder=settings["state_folder"], forget=settings["forget"]
+        )
         self._node_watch: NodeWatch | None = None
         self._guard: StopGuard | None = None
 
@@ -113,7 +117,9 @@ class ExecutorNode(LifecycleNode):
         from mauve_rt.node.executor.stop_guard import StopGuard  # noqa: PLC0415
 
         query_group = MutuallyExclusiveCallbackGroup()
-        self._diagnostics = Diagnostics(self, self._runtime, self._bound, self._recording, self._rules)
+        self._diagnostics = Diagnostics(
+            self, self._runtime, self._bound, self._recording, self._rules, folder=self._folder
+        )
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
         control = Control(
@@ -233,6 +239,7 @@ class ExecutorNode(LifecycleNode):
             names = ("rules", "bag", "record_topics", "bag_split_s", "bag_split_bytes")
             rules, bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)
         self._rules.configure(rules)
+        self._folder.configure(self._runtime)
         if bag:
             self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
         self._log_realtime()
@@ -329,6 +336,7 @@ class ExecutorNode(LifecycleNode):
                 self.get_logger().error(str(error))
                 self._recording.stop()
                 self._rules.close()
+                self._folder.close()
                 self._bound.close()
         finally:
             if self._guard is not None:
@@ -352,6 +360,7 @@ class ExecutorNode(LifecycleNode):
         self._state.flush()
         self._recording.stop()
         self._rules.close()
+        self._folder.close()
         self._bound.close()
         if self._guard is not None:
             self._guard.release()

@@ -9,7 +9,7 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_msgs.msg import SupervisorDecision
-from mauve_rt._kernel import Overlay, RuleFacts, RuleRunner, ToldDecision, monotonic_ns
+from mauve_rt._kernel import KEPT, Overlay, RuleFacts, RuleRunner, ToldDecision, monotonic_ns
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
@@ -182,6 +182,9 @@ class OwnRules:
         runner = loaded.runner(self._runtime.host, topics, self._rested)
         self._rested = None
         self._listen(_silent(loaded.rules, topics))
+        overlays = self._runtime.architecture.overlays
+        for name in names:
+            overlays.move(name, KEPT, "")  # it goes on
         runner.start()
         self._runner, self._names = runner, [rule.name for rule in loaded.rules]
         self._ending.clear()
@@ -207,6 +210,31 @@ class OwnRules:
     def names(self) -> list[str]:
         """Of the rules that are at work."""
         return self._names
+
+    def file_names(self) -> list[str]:
+        """Of the rules of the file, at work or not."""
+        return [rule.name for rule in self._of_file()]
+
+    def latched(self) -> list[str]:
+        """Those that only a reset ends."""
+        return [rule.name for rule in self._of_file() if rule.latch]
+
+    def safety(self) -> dict[str, set[str]]:
+        """Safety rules, with the components that they are about."""
+        rules = [rule for rule in self._of_file() if rule.safety]
+        if not rules:
+            return {}
+        from mauve_rt.supervision.effects import touched  # noqa: PLC0415
+
+        return {rule.name: touched(rule.do) for rule in rules}
+
+    def _of_file(self) -> Sequence["Rule"]:
+        loaded = self._loaded
+        return loaded.rules if loaded is not None else ()
+
+    def is_active(self, rule: str) -> bool:
+        """Whether a rule of the executor is active."""
+        return any(each.rule == rule and each.is_active for each in self._at_work())
 
     def reset(self, rule: str) -> str:
         """End an active rule whose condition is false, be it latched; "": done, else why not."""

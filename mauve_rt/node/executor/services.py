@@ -26,6 +26,7 @@ from mauve_msgs.srv import (
     Stop,
     StopRecording,
 )
+from mauve_rt._kernel import HELD_STOPPED, KEPT
 from mauve_rt.control.control import Control
 from mauve_rt.control.open_changes import abandon, open_changes
 from mauve_rt.control.requests import Code, Outcome, RecordingOrder, ReloadOrder, Report, Request
@@ -253,18 +254,34 @@ class Services:
 
     def _on_load_rules(self, request: Any, response: Any) -> Any:
         code, response.message = self._load_rules(request.path, request.release)
+        kept = [rule for rule in request.release if self._control.outlasted(rule, KEPT)]
+        for rule in kept if code is Code.OK else ():
+            outcome = self._control.end_kept(rule)
+            code, response.message = outcome.code, f"{response.message}; {outcome.message}"
         return self._answered(response, code, f"rules of {request.path or 'the same file'}")
 
     def _reset_rule(self, request: Any, response: Any) -> Any:
         code, response.message = Code.INVALID, "name a rule or a component"
         if request.rule:
-            refusal = self._rules.reset(request.rule)
-            code = Code.CONDITION_NOT_FALSE if refusal else Code.OK
-            response.message = refusal or f"rule {request.rule} has ended"
+            code, response.message = self._reset(request.rule)
         elif request.component and self._runtime.configured:
             outcome = self._control.forgive(request.component)
             code, response.message = outcome.code, outcome.message
         return self._answered(response, code, f"reset_rule {request.rule or request.component}")
+
+    def _reset(self, rule: str) -> tuple[Code, str]:
+        if self._control.outlasted(rule, KEPT):
+            text = f"rule {rule} was active before the restart, and the rules file lacks it"
+            return Code.CONDITION_NOT_FALSE, f"{text}; mauve rules release {rule} ends it"
+        is_held = self._control.outlasted(rule, HELD_STOPPED)
+        is_own = self._rules.is_active(rule) or not is_held
+        if is_own and (refusal := self._rules.reset(rule)):
+            return Code.CONDITION_NOT_FALSE, refusal
+        if is_held:
+            outcome = self._control.end_outlasted(rule, HELD_STOPPED)
+            if not outcome.success:
+                return outcome.code, outcome.message
+        return Code.OK, f"rule {rule} has ended"
 
     def _release_rules(self, request: Any, response: Any) -> Any:
         code, response.message = Code.NOT_ACTIVE, "the executor is not active"

@@ -35,6 +35,12 @@ PARAMETERS: dict[str, Setting] = {
         0, "size at which a recording goes on in a new file, in bytes; 0: never", _CONFIGURED, minimum=0
     ),
     "rules": Setting("", "rules file; the executor runs its rules `in: executor`; empty: none", _CONFIGURED),
+    "state_folder": Setting(
+        "",
+        "folder in which latched rules, quarantine and what persons changed outlast a restart; "
+        "empty: nothing outlasts it",
+    ),
+    "forget": Setting(default=False, description="start without what `state_folder` holds; it is put aside"),
     "autostart": Setting(default=True, description="configure and activate at the start"),
     "require_realtime": Setting(default=False, description="refuse to start without real-time rights"),
     "trace": Setting(default=True, description="write trace records"),

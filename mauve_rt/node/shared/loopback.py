@@ -16,12 +16,12 @@ from typing import Any, NamedTuple
 
 from mauve_rt.node.shared.discovery import (
     LOCALHOST_ONLY,
+    OPEN_PROFILE,
+    OPEN_UDP_PROFILE,
     PROFILE,
     PROFILES,
     RANGE,
     UDP_PROFILE,
-    OPEN_PROFILE,
-    OPEN_UDP_PROFILE,
     has_open_profile,
     has_own_profile,
     is_off,
@@ -123,7 +123,11 @@ def waiting_transport() -> str:
     except OSError:
         text = ""
     udp, ready = (len(re.findall(pattern, text)) for pattern in (_UDP, _NON_BLOCKING))
-    return "" if udp and udp == ready else f"{profile} has no <non_blocking_send>true</non_blocking_send> for each UDP transport"
+    return (
+        ""
+        if udp and udp == ready
+        else f"{profile} has no <non_blocking_send>true</non_blocking_send> for each UDP transport"
+    )
 
 
 def users_profile() -> str:

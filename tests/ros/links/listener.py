@@ -1,6 +1,6 @@
 """Writes a line for each message of a topic: when it came (s of CLOCK_MONOTONIC, the same on all machines), its value.
 
-    listener.py TOPIC FILE
+listener.py TOPIC FILE
 """
 
 import sys

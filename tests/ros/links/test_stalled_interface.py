@@ -29,7 +29,21 @@ connections:
   - [metronome.beat, beat.write]
 """
 LISTENER = Path(__file__).with_name("listener.py")
-_STALL = ["tc", "qdisc", "add", "dev", "cable", "root", "tbf", "rate", "1kbit", "burst", "2k", "limit", "100000000"]
+_STALL = [
+    "tc",
+    "qdisc",
+    "add",
+    "dev",
+    "cable",
+    "root",
+    "tbf",
+    "rate",
+    "1kbit",
+    "burst",
+    "2k",
+    "limit",
+    "100000000",
+]
 LASTS_S = 4.0  # several times as long as the buffer of a socket takes to fill
 
 

@@ -43,6 +43,10 @@ struct Element {
 
 /// How the author of what a rule did begins: Authored::author.
 inline constexpr std::string_view kByRule = "rule ";
+/// Sources of overlays that an executor found at its start: of rules that its rules file lacks ...
+inline constexpr std::string_view kKept = "(kept)";
+/// ... and of components that stay stopped, as it cannot know or do what a rule wants of them.
+inline constexpr std::string_view kHeldStopped = "(held stopped)";
 
 /// An assignment and the element that it sets; no target: it sets none (resynchronise).
 struct Assigned {
@@ -67,11 +71,30 @@ struct OverlaySpec {
   bool safety{false};            // above all that are not, and above a person's overlay that does not name it
   bool whole{false};             // it contributes nothing while one of its elements is taken
   bool ends_with_source{false};  // it is released when the source is gone
+  bool latch{false};             // a person ends it
   std::vector<Assigned> assigns{};  // of several of one element the last one is its value
   std::vector<Assigned> leaves{};   // becomes the base at its end ...
   bool leaves_over_persons{false};  // ... else only where no person gave the element its base
 
   bool operator==(const OverlaySpec&) const = default;
+};
+
+/// A base that a person chose, and what the architecture file said of the element then.
+struct KeptBase {
+  Assigned assigned{};
+  std::string author{};
+  std::optional<Assignment> of_file{};
+
+  bool operator==(const KeptBase&) const = default;
+};
+
+/// What outlasts the process.
+struct KeptState {
+  std::vector<OverlaySpec> active{};  // of latched rules
+  std::vector<Assigned> rejected{};
+  std::vector<KeptBase> bases{};
+
+  bool operator==(const KeptState&) const = default;
 };
 
 enum class Activity : std::uint8_t {
@@ -87,9 +110,11 @@ enum class Activity : std::uint8_t {
 /// | activity_  | who decides; Overlays: ended -> inactive | all | release/acquire: who sees it active sees no base of later |
 /// | engaged_   | who decides           | all     | release/acquire: odd before anything is begun, even after it is over and described |
 /// | outdated_  | who decides, Overlays | who prepares and who begins | release/acquire: what was found out before it was read may be of yesterday |
+/// | word_      | who decides, Overlays | who keeps the state         | release/acquire: who sees it grow sees the activity |
 class Overlay {
  public:
-  explicit Overlay(OverlaySpec spec) : spec_(std::move(spec)) {}
+  Overlay(OverlaySpec spec, std::shared_ptr<Atomic<std::uint32_t>> word)
+      : spec_(std::move(spec)), word_(std::move(word)) {}
   Overlay(const Overlay&) = delete;
   Overlay& operator=(const Overlay&) = delete;
 
@@ -129,6 +154,7 @@ class Overlay {
   bool has_given_back(const Element& element) const;
 
   const OverlaySpec spec_;
+  const std::shared_ptr<Atomic<std::uint32_t>> word_;  // of the Overlays, which it may outlive
   std::size_t order_{0};  // among those of equal priority; guarded by Overlays::mutex_
   std::vector<Element>
       given_back_{};  // of the overlay that it takes the place of; guarded by Overlays::mutex_
@@ -166,6 +192,7 @@ struct HeldElement {
 ///
 /// | member   | written by                       | guarded by |
 /// | -------- | -------------------------------- | ---------- |
+/// | word_    | who changes what is kept         | release/acquire: who waits reads the rest after it |
 /// | the rest | who loads rules, makes changes, requests | mutex_ |
 class Overlays {
  public:
@@ -198,6 +225,24 @@ class Overlays {
   /// What rules that have ended leave becomes the base. [non-rt]
   void settle_ended();
 
+  // ---- over a restart
+
+  /// Grows with each activity, quarantine and base that changes; a futex. [rt]
+  const Atomic<std::uint32_t>& word() const MAUVE_RT { return *word_; }
+  /// [rt]
+  void bump() MAUVE_RT;
+  /// What is to outlast the process. `file`: what the architecture file made. [non-rt]
+  KeptState kept(const ArchitectureDescription& file) const;
+  /// Puts it in force, of an architecture that does not run. Rules that are not among `rules` are of the source kKept; a base of
+  /// which the file has another value by now is left out, and returned. [non-rt]
+  std::vector<KeptBase> restore(const KeptState& state, const std::set<std::string>& rules,
+                                const ArchitectureDescription& file);
+  /// What makes the architecture so, and who wants it; without starts and stops. [non-rt]
+  std::vector<std::pair<std::string, Assignment>> restoring_steps(
+      const ArchitectureDescription& description) const;
+  /// The rule is of that source from now on, as active as it was; false: the other source has no such rule. [non-rt]
+  bool move(const std::string& rule, const std::string& from, const std::string& to);
+
   // ---- following the architecture
 
   /// Which overlays were engaged at one instant.
@@ -228,8 +273,8 @@ class Overlays {
   void set_base(const Assigned& assigned, const std::string& author);
   /// At an activation, where persons' stops end. [non-rt]
   void start_all();
-  /// Whether a rule keeps the component stopped. [non-rt]
-  bool is_kept_stopped(const std::string& component) const;
+  /// Whether a rule keeps the component stopped, or a part of it is in quarantine. [non-rt]
+  bool is_kept_stopped(const std::string& component, const ArchitectureDescription& description) const;
 
   /// The value was rejected, by a probation or a fault: it is in quarantine, and not put in again. [non-rt]
   void reject(const Assigned& assigned);
@@ -279,6 +324,7 @@ class Overlays {
   bool is_free(const Element& element, const Look& before) const MAUVE_REQUIRES(mutex_);
   static bool was_free(const Overlay& each, const Look& before);
 
+  const std::shared_ptr<Atomic<std::uint32_t>> word_ = std::make_shared<Atomic<std::uint32_t>>(0U);
   mutable Mutex mutex_;
   std::uint64_t changes_ MAUVE_GUARDED_BY(mutex_){0};
   std::vector<std::shared_ptr<Overlay>> all_ MAUVE_GUARDED_BY(mutex_);

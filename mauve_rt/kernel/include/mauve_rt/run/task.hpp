@@ -477,7 +477,8 @@ class Task final : public Waiter {
   Atomic<std::uint32_t> parked_{1};
   Atomic<std::uint32_t> ready_{0};
   Atomic<std::uint32_t> ended_{0};
-  Atomic<std::uint32_t> started_{0};  // the start that was posted last has been taken up
+  Atomic<std::uint32_t> started_{
+      1};  // the start that was posted last has been taken up; none is open at first
   Atomic<std::uint32_t> ended_runs_{0};
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
   Atomic<std::uint32_t> slot_{kEmpty};
