@@ -35,6 +35,7 @@ _FILE_HERE = Path("DEFAULT_FASTRTPS_PROFILES.xml")  # which Fast DDS reads from 
 _MIDDLEWARE, _FAST_DDS = "RMW_IMPLEMENTATION", "rmw_fastrtps"
 _SELF = Path("/proc/self")
 _IPV4_DIGITS = 8
+_WAITING = "a network interface that stands still can hold up every topic, also on this machine: {}"
 _UDP, _NON_BLOCKING = r"<type>\s*UDPv[46]\s*</type>", r"<non_blocking_send>\s*true\s*</non_blocking_send>"
 
 
@@ -52,9 +53,7 @@ class Reach(NamedTuple):
         """Write it to the log of a node."""
         (logger.warning if self.is_warning else logger.info)(self.text)
         if waits := waiting_transport():
-            logger.warning(
-                f"a network interface that stands still can hold up every topic, those of this machine too: {waits}"
-            )
+            logger.warning(_WAITING.format(waits))
 
 
 def keep_to_this_machine() -> None:
@@ -123,11 +122,9 @@ def waiting_transport() -> str:
     except OSError:
         text = ""
     udp, ready = (len(re.findall(pattern, text)) for pattern in (_UDP, _NON_BLOCKING))
-    return (
-        ""
-        if udp and udp == ready
-        else f"{profile} has no <non_blocking_send>true</non_blocking_send> for each UDP transport"
-    )
+    if udp and udp == ready:
+        return ""
+    return f"{profile} has no <non_blocking_send>true</non_blocking_send> for each UDP transport"
 
 
 def users_profile() -> str:

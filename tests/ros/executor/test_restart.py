@@ -4,7 +4,7 @@ import os
 import random
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -167,10 +167,8 @@ class Robot:
 
 
 @pytest.fixture
-def robot(
-    graph: Any, start_executor: Callable[..., Any], tmp_path: Path, plugin_prefix: Path
-) -> Iterator[Robot]:
-    yield Robot(graph, start_executor, tmp_path)
+def robot(graph: Any, start_executor: Callable[..., Any], tmp_path: Path, plugin_prefix: Path) -> Robot:
+    return Robot(graph, start_executor, tmp_path)
 
 
 def test_a_latched_stop_outlasts_a_kill_until_its_reset(robot: Robot):
@@ -190,8 +188,8 @@ def test_a_latched_stop_outlasts_a_kill_until_its_reset(robot: Robot):
 
 def test_a_latched_stop_outlasts_kills_at_any_instant(robot: Robot):
     """Also while an executor starts, or writes its file."""
-    seed = random.randrange(2**32)
-    chance = random.Random(seed)
+    seed = random.randrange(2**32)  # noqa: S311
+    chance = random.Random(seed)  # noqa: S311
     robot.start()
     robot.latch()
     for number in range(KILLS):
@@ -229,7 +227,7 @@ def test_a_rule_that_the_file_lacks_stays_until_it_is_released(robot: Robot):
 
 
 @pytest.mark.parametrize("goes_on", [True, False])
-def test_it_goes_on_or_is_let_go_by_rules_that_are_loaded(robot: Robot, goes_on: bool):
+def test_it_goes_on_or_is_let_go_by_rules_that_are_loaded(robot: Robot, *, goes_on: bool):
     robot.start()
     robot.latch()
     robot.rules.write_text(OTHERS, encoding="utf-8")

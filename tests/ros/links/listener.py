@@ -1,10 +1,11 @@
-"""Writes a line for each message of a topic: when it came (s of CLOCK_MONOTONIC, the same on all machines), its value.
+"""Writes a line for each message of a topic: when it came (s of CLOCK_MONOTONIC), and its value.
 
 listener.py TOPIC FILE
 """
 
 import sys
 import time
+from pathlib import Path
 
 import rclpy
 from rclpy.node import Node
@@ -15,7 +16,7 @@ def main() -> None:
     topic, path = sys.argv[1:]
     rclpy.init()
     node = Node("listener")
-    with open(path, "w", encoding="utf-8", buffering=1) as file:
+    with Path(path).open("w", encoding="utf-8", buffering=1) as file:
         node.create_subscription(
             Float64, topic, lambda message: file.write(f"{time.monotonic()} {message.data}\n"), 100
         )

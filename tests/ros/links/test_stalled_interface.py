@@ -1,4 +1,4 @@
-"""A network interface whose queue stands still, with a listener behind it: what is heard on the machine itself."""
+"""A network interface whose queue stands still: what listeners on the machine itself hear."""
 
 import os
 import signal
@@ -29,21 +29,7 @@ connections:
   - [metronome.beat, beat.write]
 """
 LISTENER = Path(__file__).with_name("listener.py")
-_STALL = [
-    "tc",
-    "qdisc",
-    "add",
-    "dev",
-    "cable",
-    "root",
-    "tbf",
-    "rate",
-    "1kbit",
-    "burst",
-    "2k",
-    "limit",
-    "100000000",
-]
+_STALL = ["tc", "qdisc", "add", "dev", "cable", "root", "tbf", "rate", "1kbit", "burst", "2k"]
 LASTS_S = 4.0  # several times as long as the buffer of a socket takes to fill
 
 
@@ -75,7 +61,7 @@ class Robot:
 
     def stall(self) -> None:
         """From now on the network interface lets nothing through."""
-        subprocess.run([*self.hosts.wrapper("robot"), *_STALL], check=True)
+        subprocess.run([*self.hosts.wrapper("robot"), *_STALL, "limit", "100000000"], check=True)
 
     def close(self) -> None:
         for process in (self.executor.process, *self._listeners):
