@@ -133,7 +133,7 @@ def _checked_model(file: "RulesFile", architecture: Path | None) -> "Architectur
     from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
 
     model = load_architecture(architecture)
-    if problems := [*standing_findings(file, model), *rehearsal_problems(file, model)[0]]:
+    if problems := [*standing_findings(file, model), *rehearsal_problems(file, model)]:
         raise ArchitectureFileError(file.path, problems)
     return model
 

@@ -150,6 +150,13 @@ class Robot:
             return bool(self.ask_reset(rule).success)
 
         self.graph.spin_until(is_reset, "the reset")
+        self.await_forgotten(rule)
+
+    def await_forgotten(self, rule: str = "e_stop") -> None:
+        """A kill before it would lose the reset."""
+        self.graph.spin_until(
+            lambda: f'"{rule}"' not in self.file.read_text(encoding="utf-8"), "a state file without the rule"
+        )
 
     def await_error(self, words: str) -> None:
         """In /diagnostics, of the state folder."""
@@ -297,6 +304,7 @@ def test_what_cannot_be_known_or_kept_stops_the_components_of_safety_rules(
     robot.await_state(RUNNING)
     if trouble is damaged:
         assert len(list(robot.file.parent.glob("*.20*"))) == 1, "it is put aside"
+        robot.await_forgotten()
         robot.restart()
         robot.await_state(RUNNING)
     else:
