@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <string>
@@ -89,7 +90,7 @@ class RandomRules {
     rules::RuleActions& actions = known.actions;
     RuleDeed deed = static_cast<RuleDeed>(1 + dice_.below(2));
     if (behaves_badly_ && dice_.once_in(2)) deed = static_cast<RuleDeed>(3 + dice_.below(5));
-    known.is_good = deed == RuleDeed::good || deed == RuleDeed::other || deed == RuleDeed::slow;
+    known.is_good = !is_bad(deed);
     switch (dice_.below(5)) {
       case 0:
         actions.do_steps = {
@@ -225,6 +226,26 @@ class RandomRules {
                                                     std::to_string(beats.empty() ? 0.0 : beats.back().value));
     }
   }
+  /// What the rule may do, with what it gives back of the rule of its name in the set before.
+  std::vector<Assignment> steps_of(const KnownRule& known) const {
+    const Overlays& overlays = architecture_->overlays();
+    const auto overlay = overlays.find(known.rule.name);
+    std::vector<Assignment> steps = overlays.steps_if(*overlay, true, nullptr);
+    std::ranges::move(overlays.steps_if(*overlay, false, nullptr), std::back_inserter(steps));
+    return steps;
+  }
+  /// Whether no part of the rule behaves badly, nor one that it gives back.
+  bool is_good(const KnownRule& known) const {
+    return known.is_good && std::ranges::none_of(steps_of(known), [](const Assignment& step) {
+             const auto core = std::ranges::find(kRuleCores, step.name);
+             return core != kRuleCores.end() && is_bad(static_cast<RuleDeed>(core - kRuleCores.begin()));
+           });
+  }
+  bool is_about(const KnownRule& known, const std::string& component) const {
+    return known.rule.about.front() == component ||
+           std::ranges::any_of(steps_of(known),
+                               [&](const Assignment& step) { return step.target == component; });
+  }
   /// Of the first set: where each rule about a component undoes, and none is active, it is as it was declared.
   void expect_back(const std::vector<rules::RuleFacts>& facts) {
     for (int component = 0; component < components_ && sets_ == 1; ++component) {
@@ -232,7 +253,7 @@ class RandomRules {
       bool is_expected = !has_interfered_ && RuleParts::hung_states == 0;
       for (std::size_t i = 0; i < known_.size(); ++i) {
         if (known_[i].rule.about.front() != name) continue;
-        is_expected = is_expected && known_[i].is_good && known_[i].rule.undoes && facts[i].status.armed &&
+        is_expected = is_expected && is_good(known_[i]) && known_[i].rule.undoes && facts[i].status.armed &&
                       !facts[i].status.active;
       }
       if (!is_expected) continue;
@@ -263,7 +284,7 @@ class RandomRules {
           std::ranges::count_if(known_, [&](const KnownRule& other) { return other.contends(known); }) == 1;
       const std::string what = known.rule.name + ", problem '" + facts[i].problem + "', component in state " +
                                std::to_string(static_cast<int>(task_state)) + ": ";
-      if (!is_alone || !known.is_good || RuleParts::hung_states > 0) continue;
+      if (!is_alone || !is_good(known) || RuleParts::hung_states > 0) continue;
       findings_.count("rules settled");
       if (status.holds()) expect(status.in_effect, what + "its condition holds, and it is not in effect");
       if (status.truth == rules::Truth::no)
@@ -277,17 +298,14 @@ class RandomRules {
   void expect_wanted(const std::vector<rules::RuleFacts>& facts) {
     const ArchitectureDescription description = architecture_->describe();
     for (const HeldElement& held : architecture_->overlays().table()) {
-      const auto is_about_it = [&](const KnownRule& known) {
-        return known.rule.about.front() == held.element.target;
-      };
       const std::shared_ptr<Component> component = architecture_->find_component(held.element.target);
       bool is_expected =
           !has_interfered_ && RuleParts::hung_states == 0 && held.wanted.step.has_value() &&
           component != nullptr &&  // of one that does not run, a rule that is gone undoes nothing yet
           component->task().state() == ComponentState::running;
       for (std::size_t i = 0; i < known_.size(); ++i)
-        is_expected =
-            is_expected && (!is_about_it(known_[i]) || (known_[i].is_good && facts[i].status.armed));
+        is_expected = is_expected && (!is_about(known_[i], held.element.target) ||
+                                      (is_good(known_[i]) && facts[i].status.armed));
       if (!is_expected) continue;
       findings_.count("elements wanted");
       const auto now = present(description, held.element);

@@ -67,7 +67,8 @@ class RuleHistory {
     std::optional<rules::Act> under_way{};  // do or undo
     bool is_in_reserve{false};
     bool is_armed{false};
-    bool is_adopted{true};  // it may have been active before
+    bool is_adopted{true};    // it may have been active before
+    bool was_adopted{false};  // it was at work before
     time_ns_t stamp_ns{0};
     time_ns_t begun_ns{0};
   };
@@ -104,8 +105,11 @@ class RuleHistory {
                  what + "the action of " + rules_[k].rule.name + " about the same is under way");
         life.under_way = decision.act;
         life.begun_ns = decision.stamp_ns;
-        if (!life.is_adopted) check_cause(decision, known, what);
+        if (!life.is_adopted && !ends_what_was(decision, life)) check_cause(decision, known, what);
         if (decision.act == Act::undo) life.is_adopted = false;
+        break;
+      case Decided::adopted:
+        life.was_adopted = true;
         break;
       case Decided::condition_true:
         life.is_adopted = false;
@@ -129,6 +133,11 @@ class RuleHistory {
       default:
         break;
     }
+  }
+
+  /// What was in effect before, and no longer wanted, ends whatever the condition is: no turn of it is the cause.
+  static bool ends_what_was(const rules::Decision& decision, const Life& life) {
+    return life.was_adopted && decision.act == rules::Act::undo && decision.cause_ns == 0;
   }
 
   /// What begins has had its condition for long enough.
