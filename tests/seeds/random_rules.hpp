@@ -127,6 +127,7 @@ class RandomRules {
       actions.push_back(known_.back().actions);
     }
     has_interfered_ = false;
+    rest_ns_ = kForever;
     std::unique_ptr<rules::RuleRunner> runner;
     for (int loads = 1 + dice_.below(3); loads > 0; --loads) {  // the same ones go on
       auto next = std::make_unique<rules::RuleRunner>(*deployer_, rules, actions,
@@ -138,7 +139,7 @@ class RandomRules {
   }
   void run(rules::RuleRunner& runner, bool is_last) {
     runner_ = &runner;
-    RuleHistory history(known_, beats_, findings_);
+    RuleHistory history(known_, beats_, rest_ns_, findings_);
     history_ = &history;
     runner.start();
     RuleParts::may_hang = true;
@@ -154,13 +155,13 @@ class RandomRules {
     if (!is_cut) expect_settled();
     RuleParts::hung_may_go_on = true;
     if (is_last && dice_.once_in(3)) deployer_->shutdown();
-    const time_ns_t stopped_ns = seeds::now_ns();
+    rest_ns_ = seeds::now_ns();
     runner.stop();
     is_over_ = true;
     runner.wake();
     taker.join();
     history.add(runner.wait_told(0));
-    history.check(runner.lost(), stopped_ns);
+    history.check(runner.lost(), rest_ns_);
     expect_still();
     RuleParts::may_hang = false;
   }
@@ -280,8 +281,9 @@ class RandomRules {
       const rules::RuleStatus& status = facts[i].status;
       const auto task_state = architecture_->component(known.rule.about.front()).task().state();
       if (!status.armed) continue;
-      const bool is_alone =
-          std::ranges::count_if(known_, [&](const KnownRule& other) { return other.contends(known); }) == 1;
+      const bool is_alone = std::ranges::count_if(known_, [&](const KnownRule& other) {
+                              return is_about(other, known.rule.about.front());
+                            }) == 1;
       const std::string what = known.rule.name + ", problem '" + facts[i].problem + "', component in state " +
                                std::to_string(static_cast<int>(task_state)) + ": ";
       if (!is_alone || !is_good(known) || RuleParts::hung_states > 0) continue;
@@ -337,7 +339,8 @@ class RandomRules {
   rules::RuleRunner* runner_{nullptr};
   RuleHistory* history_{nullptr};
   int components_{0};
-  int sets_{0};  // of rules, that were at work so far
+  time_ns_t rest_ns_{kForever};  // when the runner before ended
+  int sets_{0};                  // of rules, that were at work so far
   std::vector<KnownRule> known_;
   std::map<std::string, std::vector<Beat>> beats_;
   bool has_interfered_{false};
