@@ -90,7 +90,7 @@ class RandomRules {
     rules::RuleActions& actions = known.actions;
     RuleDeed deed = static_cast<RuleDeed>(1 + dice_.below(2));
     if (behaves_badly_ && dice_.once_in(2)) deed = static_cast<RuleDeed>(3 + dice_.below(5));
-    known.is_good = !is_bad(deed);
+    known.is_good = !testing::is_bad(deed);
     switch (dice_.below(5)) {
       case 0:
         actions.do_steps = {
@@ -142,6 +142,7 @@ class RandomRules {
     RuleHistory history(known_, beats_, rest_ns_, findings_);
     history_ = &history;
     runner.start();
+    hung_before_ = RuleParts::hung_hooks;
     RuleParts::may_hang = true;
     is_over_ = false;
     OrdinaryThread taker([this] {
@@ -213,7 +214,7 @@ class RandomRules {
 
   /// What was written a while ago, each rule that watches knows.
   void expect_seen() {
-    pause(RuleHistory::kSeen);
+    if (!pause(RuleHistory::kSeen)) return;
     const std::vector<rules::RuleFacts> facts = runner_->facts();
     for (std::size_t i = 0; i < known_.size(); ++i) {
       const KnownRule& known = known_[i];
@@ -227,20 +228,34 @@ class RandomRules {
                                                     std::to_string(beats.empty() ? 0.0 : beats.back().value));
     }
   }
-  /// What the rule may do, with what it gives back of the rule of its name in the set before.
-  std::vector<Assignment> steps_of(const KnownRule& known) const {
+  /// What a rule may do, with what it gives back of the rule of its name in the set before.
+  std::vector<Assignment> steps_of(const Overlay& overlay) const {
     const Overlays& overlays = architecture_->overlays();
-    const auto overlay = overlays.find(known.rule.name);
-    std::vector<Assignment> steps = overlays.steps_if(*overlay, true, nullptr);
-    std::ranges::move(overlays.steps_if(*overlay, false, nullptr), std::back_inserter(steps));
+    std::vector<Assignment> steps = overlays.steps_if(overlay, true, nullptr);
+    std::ranges::move(overlays.steps_if(overlay, false, nullptr), std::back_inserter(steps));
     return steps;
+  }
+  std::vector<Assignment> steps_of(const KnownRule& known) const {
+    return steps_of(*architecture_->overlays().find(known.rule.name));
+  }
+  /// Whether a preparation hangs that holds the components which its rule gives back of a set before.
+  bool may_be_held() const { return sets_ > 1 && RuleParts::hung_hooks > hung_before_; }
+  /// Whether a rule of a set before, which is gone, gives back a part of the component that behaves badly.
+  bool gives_back_bad(const std::string& component) const {
+    return std::ranges::any_of(architecture_->overlays().at_work({}), [&](const auto& overlay) {
+      return std::ranges::any_of(steps_of(*overlay), [&](const Assignment& step) {
+        return step.target == component && is_bad(step);
+      });
+    });
+  }
+  static bool is_bad(const Assignment& step) {
+    const auto core = std::ranges::find(kRuleCores, step.name);
+    return core != kRuleCores.end() && testing::is_bad(static_cast<RuleDeed>(core - kRuleCores.begin()));
   }
   /// Whether no part of the rule behaves badly, nor one that it gives back.
   bool is_good(const KnownRule& known) const {
-    return known.is_good && std::ranges::none_of(steps_of(known), [](const Assignment& step) {
-             const auto core = std::ranges::find(kRuleCores, step.name);
-             return core != kRuleCores.end() && is_bad(static_cast<RuleDeed>(core - kRuleCores.begin()));
-           });
+    return known.is_good &&
+           std::ranges::none_of(steps_of(known), [](const Assignment& step) { return is_bad(step); });
   }
   bool is_about(const KnownRule& known, const std::string& component) const {
     return known.rule.about.front() == component ||
@@ -263,18 +278,20 @@ class RandomRules {
       expect(core == "r/First", name + " runs " + core + ", and no rule wants it");
     }
   }
-  static void pause(time_ns_t length_ns) {
-    time_ns_t stalled_ns = -1;
-    do {
-      stalled_ns = seeds::outcome().stalled_ns;
+  /// False: the computer stands still all the time.
+  static bool pause(time_ns_t length_ns) {
+    for (int tries = 0; tries < 20; ++tries) {
+      const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
       sleep_for(length_ns);
-    } while (seeds::outcome().stalled_ns > stalled_ns + ms_to_ns(1));
+      if (seeds::outcome().stalled_ns <= stalled_ns + ms_to_ns(1)) return true;
+    }
+    return false;
   }
 
   /// Once nothing else happens, what the rules want is in force.
   void expect_settled() {
     expect_seen();
-    pause(ms_to_ns(700));  // the first retry is after 500 ms
+    if (!pause(ms_to_ns(700))) return;  // the first retry is after 500 ms
     const std::vector<rules::RuleFacts> facts = runner_->facts();
     for (std::size_t i = 0; i < known_.size(); ++i) {
       const KnownRule& known = known_[i];
@@ -286,7 +303,9 @@ class RandomRules {
                             }) == 1;
       const std::string what = known.rule.name + ", problem '" + facts[i].problem + "', component in state " +
                                std::to_string(static_cast<int>(task_state)) + ": ";
-      if (!is_alone || !is_good(known) || RuleParts::hung_states > 0) continue;
+      if (!is_alone || !is_good(known) || gives_back_bad(known.rule.about.front()) || may_be_held() ||
+          RuleParts::hung_states > 0)
+        continue;
       findings_.count("rules settled");
       if (status.holds()) expect(status.in_effect, what + "its condition holds, and it is not in effect");
       if (status.truth == rules::Truth::no)
@@ -302,7 +321,8 @@ class RandomRules {
     for (const HeldElement& held : architecture_->overlays().table()) {
       const std::shared_ptr<Component> component = architecture_->find_component(held.element.target);
       bool is_expected =
-          !has_interfered_ && RuleParts::hung_states == 0 && held.wanted.step.has_value() &&
+          !has_interfered_ && RuleParts::hung_states == 0 && !may_be_held() &&
+          !gives_back_bad(held.element.target) && held.wanted.step.has_value() &&
           component != nullptr &&  // of one that does not run, a rule that is gone undoes nothing yet
           component->task().state() == ComponentState::running;
       for (std::size_t i = 0; i < known_.size(); ++i)
@@ -343,6 +363,7 @@ class RandomRules {
   int sets_{0};                  // of rules, that were at work so far
   std::vector<KnownRule> known_;
   std::map<std::string, std::vector<Beat>> beats_;
+  int hung_before_{0};  // hooks, before the runner that is at work
   bool has_interfered_{false};
   bool is_over_{false};
 };

@@ -70,7 +70,7 @@ class RuleHistory {
     bool is_armed{false};
     bool is_adopted{true};    // it may have been active before
     bool was_adopted{false};  // it was at work before
-    bool has_begun{false};    // `do`, and not `undo` since
+    bool wants{false};        // what it does: as far as it has said so
     time_ns_t armed_ns{0};    // since when its condition is looked at
     time_ns_t stamp_ns{0};
     time_ns_t begun_ns{0};
@@ -110,8 +110,12 @@ class RuleHistory {
         life.under_way = decision.act;
         life.begun_ns = decision.stamp_ns;
         if (!life.is_adopted && !ends_what_was(decision, life)) check_cause(decision, known, life, what);
-        life.has_begun = decision.act == Act::do_;
+        life.wants = decision.act == Act::do_;
         if (decision.act == Act::undo) life.is_adopted = false;
+        break;
+      case Decided::suppressed:
+        if (decision.why == rules::Why::outranked || decision.why == rules::Why::already)
+          life.wants = decision.act == Act::do_;
         break;
       case Decided::adopted:
         life.was_adopted = true;
@@ -161,7 +165,7 @@ class RuleHistory {
     bool was_so = false;
     for (std::size_t i = 0; i < beats.size(); ++i) {
       time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns : kForever - slack_ns;
-      if (life.has_begun || end_ns >= rest_ns_ - kSeen) end_ns = std::max(end_ns, life.armed_ns);
+      if (life.wants || end_ns >= rest_ns_ - kSeen) end_ns = std::max(end_ns, life.armed_ns);
       was_so = was_so || (known.holds(beats[i].value) == does && beats[i].began_ns <= decision.stamp_ns &&
                           decision.stamp_ns <= end_ns + slack_ns);
     }
