@@ -617,7 +617,8 @@ TYPED_TEST(RuleRunnerTest, FromAHigherRulesEndItGoesStraightToTheLowerOnesWant) 
 
 TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {
   this->add_rule(too_high(10.0), {}, core("t/Counting"));
-  this->add_rule(too_high(3.0), core("t/Core"), core("t/Counted"));
+  this->add_rule(too_high(3.0), {}, core("t/Counted"));
+  this->rules.back().undoes = true;
   this->rules.back().priority = 9;
   this->deploy();
   this->begin();
@@ -641,7 +642,8 @@ TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {
 
 TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesWhatWasInForceBelowAnother) {
   this->add_rule(too_high(3.0), {}, core("t/Counting"));
-  this->add_rule(too_high(10.0), core("t/Core"), core("t/Counted"));
+  this->add_rule(too_high(10.0), {}, core("t/Counted"));
+  this->rules.back().undoes = true;
   this->rules.back().priority = 9;
   this->deploy();
   this->begin();
