@@ -631,8 +631,9 @@ TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {
     };
     this->way.until(is_so, "the lower rule to turn");
   };
-  this->beat.write.write({.value = 20.0}, 1);
+  this->beat.write.write({.value = 4.0}, 1);
   this->until_there("t/Counted");
+  this->beat.write.write({.value = 20.0}, 1);
   await_active(true);
   this->beat.write.write({.value = 4.0}, 1);
   await_active(false);
