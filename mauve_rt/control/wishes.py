@@ -89,6 +89,7 @@ def _of_rule(request: Request, runtime: Runtime) -> Iterator[list[Step]]:
         if overlay is None:
             yield []
             return
+        architecture.follow()  # what of it is in force
         overlay = overlays.put(source, spec_of(request, overlay))
         yield _steps(runtime, overlay, request, is_active=False)
         _end(overlays, overlay)

@@ -89,7 +89,7 @@ bool Action::is_wanting(std::uint64_t revision, std::uint32_t based_on) const {
   const Stage stage = stage_.load(std::memory_order_acquire);
   if (stage > Stage::ready) return false;
   // relaxed: this thread wrote it
-  if (based_on_.load(std::memory_order_relaxed) != based_on || tried_at_ == 0) return true;
+  if (based_on_.load(std::memory_order_relaxed) != based_on || tried_at_ == 0 || may_pass_) return true;
   if (stage == Stage::ready && is_preparable_) return !prepared_->is_current();
   return tried_at_ != revision;
 }
@@ -108,6 +108,7 @@ bool Action::prepare(Host& host, std::uint64_t revision, ActionSteps steps, std:
   is_preparable_ = can_be_prepared(steps_);
   based_on_.store(based_on, std::memory_order_release);
   problem_.clear();
+  may_pass_ = false;
   if (steps_.empty()) return was_ready;
   try {
     prepared_ = try_steps(steps_, options_, host, rule_);
@@ -115,6 +116,9 @@ bool Action::prepare(Host& host, std::uint64_t revision, ActionSteps steps, std:
     return true;
   } catch (const std::exception& failure) {
     problem_ = failure.what();
+    const auto* const error = dynamic_cast<const Error*>(&failure);
+    may_pass_ = error != nullptr &&
+                (error->code() == ErrorCode::wrong_revision || error->code() == ErrorCode::timeout);
     return was_ready;
   }
 }
@@ -136,6 +140,7 @@ bool Action::put_away() {
   if (!stage_.compare_exchange_strong(ready, Stage::idle, std::memory_order_acq_rel)) return false;
   prepared_.reset();
   tried_at_ = 0;
+  may_pass_ = false;
   return true;
 }
 

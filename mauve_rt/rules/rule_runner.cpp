@@ -16,6 +16,8 @@ namespace {
 
 constexpr int kPriority = 97;                 // above components, below who conducts changes and who watches
 constexpr time_ns_t kPreparing = s_to_ns(1);  // a preparation that lasts longer is told
+constexpr time_ns_t kNextTry =
+    ms_to_ns(100);  // of a preparation that another one hindered, or a person called off
 constexpr std::size_t kStackBytes = std::size_t{256} * 1024;
 
 // What the follower found of a rule.
@@ -191,12 +193,23 @@ void RuleRunner::start_workers() {
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     Rule& rule = *rules_[i];
     const std::string& name = engine_->rule(i).name;
-    rule.prepares.start({.name = "prepare " + name}, [this, i] { prepare(i); });
+    rule.prepares.start({.name = "prepare " + name}, [this, i] {
+      prepare(i);
+      const auto& acts = rules_[i]->acts;
+      const bool may_pass = acts[0].may_pass() || acts[1].may_pass();
+      return may_pass ? later_by(monotonic_now_ns(), kNextTry) : kForever;
+    });
     rule.commits.start({.name = "commit " + name, .priority = kPriority, .stack_bytes = kStackBytes},
-                       [this, i] { commit(i); });
+                       [this, i] {
+                         commit(i);
+                         return kForever;
+                       });
     if (!rule.reserve.exists()) continue;
     rule.reserves.start({.name = "reserve " + name, .priority = kPriority, .stack_bytes = kStackBytes},
-                        [this, i] { reserve(i); });
+                        [this, i] {
+                          reserve(i);
+                          return kForever;
+                        });
   }
 }
 

@@ -14,7 +14,7 @@ Worker::~Worker() {
   join();
 }
 
-void Worker::start(const ThreadSettings& settings, std::function<void()> job) {
+void Worker::start(const ThreadSettings& settings, std::function<time_ns_t()> job) {
   MAUVE_EXPECTS(!runs_);
   job_ = std::move(job);
   asked_.store(0, std::memory_order_relaxed);  // the thread's creation publishes it
@@ -44,15 +44,16 @@ void Worker::join() noexcept {
 
 void Worker::run() noexcept {
   std::uint32_t done = 0;
+  time_ns_t again_ns = kForever;
   for (;;) {
     const std::uint32_t asked = asked_.load(std::memory_order_acquire);
     if ((asked & kEnding) != 0) return;
-    if (asked == done) {
-      futex_wait_until(asked_, asked, kForever);
+    if (asked == done && (again_ns == kForever || monotonic_now_ns() < again_ns)) {
+      futex_wait_until(asked_, asked, again_ns);
       continue;
     }
     done = asked;
-    job_();
+    again_ns = job_();
   }
 }
 

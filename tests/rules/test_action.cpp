@@ -1,5 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What a rule does, carried out by hand.
+#include <atomic>
+#include <chrono>
+#include <thread>
+
 #include "mauve_rt/rules/action.hpp"
 
 #include "hosts.hpp"
@@ -57,6 +61,37 @@ TYPED_TEST(ActionTest, WhatIsCalledOffChangesNothing) {
   ASSERT_TRUE(report);
   EXPECT_THAT(report->failure, ::testing::HasSubstr("called off"));
   EXPECT_EQ("t/Core", this->architecture.component("c").shown().core);
+}
+
+/// Its configure lasts until it is let go.
+struct HeldCore : TestCore {
+  bool configure_hook() override {
+    is_held.store(true);
+    while (is_held.load()) std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    return TestCore::configure_hook();
+  }
+  static inline std::atomic<bool> is_held{false};
+};
+
+TYPED_TEST(ActionTest, IsPreparedAgainWhereAnotherPreparationHinderedIt) {
+  if (TestFixture::is_virtual) GTEST_SKIP() << "in virtual time nothing lasts";
+  this->registry.template core<HeldCore>("t/Held", "t/Shell");
+  this->add("c").allow({"t/Held", "t/Refusing"}, true);
+  this->deploy();
+  std::thread other(
+      [this] { this->host().prepare(std::move(Transaction().replace_core("c", "t/Held")), {}); });
+  this->way.until([] { return HeldCore::is_held.load(); }, "the other preparation");
+  const ActionSteps gain{{.kind = "set_property", .target = "c", .name = "gain", .value = 2.0}};
+  Action action(true, {.timeouts = {.commit_ns = ms_to_ns(10)}}, "r");
+  EXPECT_FALSE(action.prepare(this->host(), 1, gain, 7));
+  EXPECT_THAT(action.problem(), ::testing::HasSubstr("another change"));
+  EXPECT_TRUE(action.may_pass());
+  EXPECT_TRUE(action.is_wanting(1, 7)) << "nothing else changes";
+  HeldCore::is_held.store(false);
+  other.join();
+  EXPECT_TRUE(action.prepare(this->host(), 1, gain, 7)) << action.problem();
+  EXPECT_FALSE(action.may_pass());
+  EXPECT_FALSE(action.is_wanting(1, 7));
 }
 
 }  // namespace

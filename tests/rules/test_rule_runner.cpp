@@ -615,6 +615,49 @@ TYPED_TEST(RuleRunnerTest, FromAHigherRulesEndItGoesStraightToTheLowerOnesWant) 
   this->until_there("t/Core");
 }
 
+TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {
+  this->add_rule(too_high(10.0), {}, core("t/Counting"));
+  this->add_rule(too_high(3.0), {}, core("t/Counted"));
+  this->rules.back().undoes = true;
+  this->rules.back().priority = 9;
+  this->deploy();
+  this->begin();
+  this->await_ready(0);
+  this->await_ready(1);
+  const auto await_active = [this](bool is_expected) {
+    const auto is_so = [this, is_expected] {
+      this->take();
+      return this->runner->facts()[0].status.active == is_expected;
+    };
+    this->way.until(is_so, "the lower rule to turn");
+  };
+  this->beat.write.write({.value = 4.0}, 1);
+  this->until_there("t/Counted");
+  this->beat.write.write({.value = 20.0}, 1);
+  await_active(true);
+  this->beat.write.write({.value = 4.0}, 1);
+  await_active(false);
+  this->beat.write.write({.value = 1.0}, 1);
+  this->until_there("t/Core");
+}
+
+TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesWhatWasInForceBelowAnother) {
+  this->add_rule(too_high(3.0), {}, core("t/Counting"));
+  this->add_rule(too_high(10.0), {}, core("t/Counted"));
+  this->rules.back().undoes = true;
+  this->rules.back().priority = 9;
+  this->deploy();
+  this->begin();
+  this->await_ready(0);
+  this->await_ready(1);
+  this->beat.write.write({.value = 4.0}, 1);
+  this->until_there("t/Counting");
+  this->beat.write.write({.value = 20.0}, 1);
+  this->until_there("t/Counted");
+  this->beat.write.write({.value = 1.0}, 1);
+  this->until_there("t/Counting");
+}
+
 TYPED_TEST(RuleRunnerTest, WhatProbationRejectedIsNotPutInAgain) {
   this->add_rule(too_high(), core("t/Counted"), core("t/Counting"));
   this->deploy();

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <string>
@@ -89,7 +90,7 @@ class RandomRules {
     rules::RuleActions& actions = known.actions;
     RuleDeed deed = static_cast<RuleDeed>(1 + dice_.below(2));
     if (behaves_badly_ && dice_.once_in(2)) deed = static_cast<RuleDeed>(3 + dice_.below(5));
-    known.is_good = deed == RuleDeed::good || deed == RuleDeed::other || deed == RuleDeed::slow;
+    known.is_good = !testing::is_bad(deed);
     switch (dice_.below(5)) {
       case 0:
         actions.do_steps = {
@@ -126,6 +127,7 @@ class RandomRules {
       actions.push_back(known_.back().actions);
     }
     has_interfered_ = false;
+    rest_ns_ = kForever;
     std::unique_ptr<rules::RuleRunner> runner;
     for (int loads = 1 + dice_.below(3); loads > 0; --loads) {  // the same ones go on
       auto next = std::make_unique<rules::RuleRunner>(*deployer_, rules, actions,
@@ -137,9 +139,10 @@ class RandomRules {
   }
   void run(rules::RuleRunner& runner, bool is_last) {
     runner_ = &runner;
-    RuleHistory history(known_, beats_, findings_);
+    RuleHistory history(known_, beats_, rest_ns_, findings_);
     history_ = &history;
     runner.start();
+    hung_before_ = RuleParts::hung_hooks;
     RuleParts::may_hang = true;
     is_over_ = false;
     OrdinaryThread taker([this] {
@@ -153,13 +156,13 @@ class RandomRules {
     if (!is_cut) expect_settled();
     RuleParts::hung_may_go_on = true;
     if (is_last && dice_.once_in(3)) deployer_->shutdown();
-    const time_ns_t stopped_ns = seeds::now_ns();
+    rest_ns_ = seeds::now_ns();
     runner.stop();
     is_over_ = true;
     runner.wake();
     taker.join();
     history.add(runner.wait_told(0));
-    history.check(runner.lost(), stopped_ns);
+    history.check(runner.lost(), rest_ns_);
     expect_still();
     RuleParts::may_hang = false;
   }
@@ -211,7 +214,7 @@ class RandomRules {
 
   /// What was written a while ago, each rule that watches knows.
   void expect_seen() {
-    pause(RuleHistory::kSeen);
+    if (!pause(RuleHistory::kSeen)) return;
     const std::vector<rules::RuleFacts> facts = runner_->facts();
     for (std::size_t i = 0; i < known_.size(); ++i) {
       const KnownRule& known = known_[i];
@@ -225,6 +228,40 @@ class RandomRules {
                                                     std::to_string(beats.empty() ? 0.0 : beats.back().value));
     }
   }
+  /// What a rule may do, with what it gives back of the rule of its name in the set before.
+  std::vector<Assignment> steps_of(const Overlay& overlay) const {
+    const Overlays& overlays = architecture_->overlays();
+    std::vector<Assignment> steps = overlays.steps_if(overlay, true, nullptr);
+    std::ranges::move(overlays.steps_if(overlay, false, nullptr), std::back_inserter(steps));
+    return steps;
+  }
+  std::vector<Assignment> steps_of(const KnownRule& known) const {
+    return steps_of(*architecture_->overlays().find(known.rule.name));
+  }
+  /// Whether a preparation hangs that holds the components which its rule gives back of a set before.
+  bool may_be_held() const { return sets_ > 1 && RuleParts::hung_hooks > hung_before_; }
+  /// Whether a rule of a set before, which is gone, gives back a part of the component that behaves badly.
+  bool gives_back_bad(const std::string& component) const {
+    return std::ranges::any_of(architecture_->overlays().at_work({}), [&](const auto& overlay) {
+      return std::ranges::any_of(steps_of(*overlay), [&](const Assignment& step) {
+        return step.target == component && is_bad(step);
+      });
+    });
+  }
+  static bool is_bad(const Assignment& step) {
+    const auto core = std::ranges::find(kRuleCores, step.name);
+    return core != kRuleCores.end() && testing::is_bad(static_cast<RuleDeed>(core - kRuleCores.begin()));
+  }
+  /// Whether no part of the rule behaves badly, nor one that it gives back.
+  bool is_good(const KnownRule& known) const {
+    return known.is_good &&
+           std::ranges::none_of(steps_of(known), [](const Assignment& step) { return is_bad(step); });
+  }
+  bool is_about(const KnownRule& known, const std::string& component) const {
+    return known.rule.about.front() == component ||
+           std::ranges::any_of(steps_of(known),
+                               [&](const Assignment& step) { return step.target == component; });
+  }
   /// Of the first set: where each rule about a component undoes, and none is active, it is as it was declared.
   void expect_back(const std::vector<rules::RuleFacts>& facts) {
     for (int component = 0; component < components_ && sets_ == 1; ++component) {
@@ -232,7 +269,7 @@ class RandomRules {
       bool is_expected = !has_interfered_ && RuleParts::hung_states == 0;
       for (std::size_t i = 0; i < known_.size(); ++i) {
         if (known_[i].rule.about.front() != name) continue;
-        is_expected = is_expected && known_[i].is_good && known_[i].rule.undoes && facts[i].status.armed &&
+        is_expected = is_expected && is_good(known_[i]) && known_[i].rule.undoes && facts[i].status.armed &&
                       !facts[i].status.active;
       }
       if (!is_expected) continue;
@@ -241,29 +278,34 @@ class RandomRules {
       expect(core == "r/First", name + " runs " + core + ", and no rule wants it");
     }
   }
-  static void pause(time_ns_t length_ns) {
-    time_ns_t stalled_ns = -1;
-    do {
-      stalled_ns = seeds::outcome().stalled_ns;
+  /// False: the computer stands still all the time.
+  static bool pause(time_ns_t length_ns) {
+    for (int tries = 0; tries < 20; ++tries) {
+      const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
       sleep_for(length_ns);
-    } while (seeds::outcome().stalled_ns > stalled_ns + ms_to_ns(1));
+      if (seeds::outcome().stalled_ns <= stalled_ns + ms_to_ns(1)) return true;
+    }
+    return false;
   }
 
   /// Once nothing else happens, what the rules want is in force.
   void expect_settled() {
     expect_seen();
-    pause(ms_to_ns(700));  // the first retry is after 500 ms
+    if (!pause(ms_to_ns(700))) return;  // the first retry is after 500 ms
     const std::vector<rules::RuleFacts> facts = runner_->facts();
     for (std::size_t i = 0; i < known_.size(); ++i) {
       const KnownRule& known = known_[i];
       const rules::RuleStatus& status = facts[i].status;
       const auto task_state = architecture_->component(known.rule.about.front()).task().state();
       if (!status.armed) continue;
-      const bool is_alone =
-          std::ranges::count_if(known_, [&](const KnownRule& other) { return other.contends(known); }) == 1;
+      const bool is_alone = std::ranges::count_if(known_, [&](const KnownRule& other) {
+                              return is_about(other, known.rule.about.front());
+                            }) == 1;
       const std::string what = known.rule.name + ", problem '" + facts[i].problem + "', component in state " +
                                std::to_string(static_cast<int>(task_state)) + ": ";
-      if (!is_alone || !known.is_good || RuleParts::hung_states > 0) continue;
+      if (!is_alone || !is_good(known) || gives_back_bad(known.rule.about.front()) || may_be_held() ||
+          RuleParts::hung_states > 0)
+        continue;
       findings_.count("rules settled");
       if (status.holds()) expect(status.in_effect, what + "its condition holds, and it is not in effect");
       if (status.truth == rules::Truth::no)
@@ -277,17 +319,15 @@ class RandomRules {
   void expect_wanted(const std::vector<rules::RuleFacts>& facts) {
     const ArchitectureDescription description = architecture_->describe();
     for (const HeldElement& held : architecture_->overlays().table()) {
-      const auto is_about_it = [&](const KnownRule& known) {
-        return known.rule.about.front() == held.element.target;
-      };
       const std::shared_ptr<Component> component = architecture_->find_component(held.element.target);
       bool is_expected =
-          !has_interfered_ && RuleParts::hung_states == 0 && held.wanted.step.has_value() &&
+          !has_interfered_ && RuleParts::hung_states == 0 && !may_be_held() &&
+          !gives_back_bad(held.element.target) && held.wanted.step.has_value() &&
           component != nullptr &&  // of one that does not run, a rule that is gone undoes nothing yet
           component->task().state() == ComponentState::running;
       for (std::size_t i = 0; i < known_.size(); ++i)
-        is_expected =
-            is_expected && (!is_about_it(known_[i]) || (known_[i].is_good && facts[i].status.armed));
+        is_expected = is_expected && (!is_about(known_[i], held.element.target) ||
+                                      (is_good(known_[i]) && facts[i].status.armed));
       if (!is_expected) continue;
       findings_.count("elements wanted");
       const auto now = present(description, held.element);
@@ -319,9 +359,11 @@ class RandomRules {
   rules::RuleRunner* runner_{nullptr};
   RuleHistory* history_{nullptr};
   int components_{0};
-  int sets_{0};  // of rules, that were at work so far
+  time_ns_t rest_ns_{kForever};  // when the runner before ended
+  int sets_{0};                  // of rules, that were at work so far
   std::vector<KnownRule> known_;
   std::map<std::string, std::vector<Beat>> beats_;
+  int hung_before_{0};  // hooks, before the runner that is at work
   bool has_interfered_{false};
   bool is_over_{false};
 };

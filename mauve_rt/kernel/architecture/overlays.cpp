@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <iterator>
+#include <utility>
 
 #include "mauve_rt/base/seam/futex.hpp"
 
@@ -175,6 +176,16 @@ bool Overlay::has_given_back(const Element& element) const {
   return std::find(given_back_.begin(), given_back_.end(), element) != given_back_.end();
 }
 
+bool Overlay::leaves_own(const Assigned& left) const {
+  const Assignment* const own = find(left.element);
+  return own != nullptr && is_same_effect(*own, left.step);
+}
+
+bool Overlay::was_in_force(const Element& element) const {
+  return in_force_since_ == activations_.load(std::memory_order_acquire) &&
+         std::find(in_force_.begin(), in_force_.end(), element) != in_force_.end();
+}
+
 bool Overlay::shares_with(const Overlay& other) const {
   return std::any_of(spec_.assigns.begin(), spec_.assigns.end(), [&](const Assigned& one) {
     return !one.element.target.empty() && other.find(one.element) != nullptr;
@@ -191,6 +202,7 @@ void Overlay::set_active(bool is_active) noexcept {
   const Activity before = activity();
   if ((before == Activity::active) == is_active) return;
   const Activity after = is_active ? Activity::active : Activity::ended;
+  if (is_active) activations_.fetch_add(1, std::memory_order_release);
   activity_.store(after, std::memory_order_release);
   word_->fetch_add(1, std::memory_order_release);
   futex_wake_all(*word_);
@@ -242,6 +254,9 @@ std::shared_ptr<Overlay> Overlays::next_of(const std::string& source, OverlaySpe
     if (old->spec().source != source || old->spec().rule != next->spec().rule) continue;
     next->activity_.store(old->activity(), std::memory_order_relaxed);  // relaxed: it is not in use yet
     next->engaged_.store(old->engaged(), std::memory_order_relaxed);
+    next->activations_.store(old->activations_.load(std::memory_order_acquire), std::memory_order_relaxed);
+    next->in_force_ = old->in_force_;
+    next->in_force_since_ = old->in_force_since_;
     if (!old->is_engaged()) continue;
     next->given_back_ = old->given_back_;
     for (const Assigned& one : old->spec().assigns) next->given_back_.push_back(one.element);
@@ -347,18 +362,20 @@ std::optional<Assignment> Overlays::base_of(const Element& element, const If& su
   for (const auto& each : all_) {
     const bool has_ended =
         each.get() == supposed.rule ? !supposed.is_active : each->activity() == Activity::ended;
-    if (!has_ended || !may_leave(*each, element)) continue;
+    if (!has_ended) continue;
     for (const Assigned& one : each->spec().leaves) {
-      if (one.element == element) return one.step;
+      if (one.element == element && may_leave(*each, one)) return one.step;
     }
   }
   const auto found = bases_.find(element);
   return found != bases_.end() ? found->second.value : std::nullopt;
 }
 
-/// Whether the rule's end gives the element another base: not where a person gave it one.
-bool Overlays::may_leave(const Overlay& rule, const Element& element) const {
-  const auto found = bases_.find(element);
+/// Whether the rule's end gives the element another base: not where a person gave it one, nor where its own value, which would
+/// stay, never was there.
+bool Overlays::may_leave(const Overlay& rule, const Assigned& left) const {
+  if (rule.leaves_own(left) && !rule.was_in_force(left.element)) return false;
+  const auto found = bases_.find(left.element);
   return rule.spec().leaves_over_persons || found == bases_.end() || !is_person(found->second.author);
 }
 
@@ -447,7 +464,7 @@ void Overlays::settle_ended() {
     if (!each->activity_.compare_exchange_strong(ended, Activity::inactive, std::memory_order_acq_rel))
       continue;
     for (const Assigned& one : each->spec().leaves) {
-      if (!one.element.target.empty() && may_leave(*each, one.element))
+      if (!one.element.target.empty() && may_leave(*each, one))
         change_base(one.element, one.step, std::string(kByRule) + each->spec().rule);
     }
   }
@@ -600,6 +617,13 @@ void Overlays::follow(const Look& before, const ArchitectureDescription& descrip
     return found != authors.end() ? found->author : std::string();
   };
   for (const auto& each : all_) {
+    for (const Assigned& one : each->spec().assigns) {
+      if (one.element.target.empty() || !each->is_active()) continue;
+      const Wanted now = wanted(one.element, {});
+      const std::optional<Assignment> there = present(description, one.element);
+      const bool is_its = now.by == Wanted::By::rule && now.rule == each->spec().rule;
+      if (is_its && there && is_same_effect(*there, one.step)) note_in_force(*each, one);
+    }
     if (!was_free(*each, before)) continue;
     each->given_back_.clear();
     for (const auto* steps : {&each->spec().assigns, &each->spec().leaves}) {
@@ -613,8 +637,14 @@ void Overlays::follow(const Look& before, const ArchitectureDescription& descrip
 
 void Overlays::note(const Assigned& assigned, const std::string& author) {
   const auto& [element, step] = assigned;
-  if (author.starts_with(kByRule) || !is_made_again(step)) return;
   const LockGuard lock(mutex_);
+  if (author.starts_with(kByRule)) {
+    for (const auto& each : all_) {
+      if (author.substr(kByRule.size()) == each->spec().rule) note_in_force(*each, assigned);
+    }
+    return;
+  }
+  if (!is_made_again(step)) return;
   if (step.kind == "stop") {
     stopped_.insert(element.target);
     return;
@@ -626,6 +656,15 @@ void Overlays::note(const Assigned& assigned, const std::string& author) {
   const Wanted now = wanted(element, {});
   if (now.by == Wanted::By::rule && now.step && is_same_effect(*now.step, step)) return;  // it is its own
   change_base(element, step, author);
+}
+
+/// What the end of the rule leaves may be another by that.
+void Overlays::note_in_force(Overlay& rule, const Assigned& assigned) {
+  if (!rule.is_active() || !rule.leaves_own(assigned) || rule.was_in_force(assigned.element)) return;
+  const std::uint32_t activations = rule.activations_.load(std::memory_order_acquire);
+  if (std::exchange(rule.in_force_since_, activations) != activations) rule.in_force_.clear();
+  rule.in_force_.push_back(assigned.element);
+  if (!rule.spec().leaves.empty()) outdate(assigned.element);
 }
 
 /// What was found out of who assigns it, is of yesterday.

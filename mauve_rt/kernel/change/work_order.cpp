@@ -204,8 +204,11 @@ bool TransactionCommit::Work::settle_if_over(Change& change) noexcept {
   }
   change.is_settled = true;
   if (change.draft->is_added) return true;
-  const CommitGate::Look table(architecture_.commit_gate());
-  mark.settle();
+  {
+    const CommitGate::Look table(architecture_.commit_gate());
+    mark.settle();
+  }
+  architecture_.changes().bump();  // the description shows it only now
   return true;
 }
 

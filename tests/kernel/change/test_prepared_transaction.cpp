@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Prepared transactions: what is left of them is the commit, which waits for nobody's preparation.
+#include <algorithm>
 #include <future>
 #include <random>
 
@@ -62,6 +63,23 @@ TYPED_TEST(Prepared, CommitsAndCompletes) {
   EXPECT_EQ(2U, prepared->complete().steps.size()) << "it may be asked again";
   this->run_for(ms_to_ns(5));
   EXPECT_EQ(ComponentState::running, this->state("a"));
+}
+
+TYPED_TEST(Prepared, IsSignalledAgainOnceTheDescriptionShowsIt) {
+  auto prepared = this->gain("a", 3.0);
+  EXPECT_EQ(PreparedOutcome::committed, prepared->commit(kTimeout));
+  const Atomic<std::uint32_t>& word = this->architecture.changes().word;
+  const std::uint32_t seen = word.load();
+  const auto is_shown = [this] {
+    const auto& properties = this->architecture.component("a").shown().properties;
+    return std::any_of(properties.begin(), properties.end(), [](const ShownProperty& one) {
+      return one.name == "gain" && one.value == PropertyValue(3.0);
+    });
+  };
+  const bool was_shown = is_shown();  // another thread may have looked
+  prepared->complete();
+  EXPECT_TRUE(is_shown());
+  EXPECT_TRUE(was_shown || word.load() != seen);
 }
 
 TYPED_TEST(Prepared, CommitsOnce) {

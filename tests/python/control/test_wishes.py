@@ -161,3 +161,17 @@ def test_a_rejected_value_is_put_in_by_a_person_only(world: World) -> None:
 def test_the_rule_that_is_not_active_has_nothing_to_release(world: World) -> None:
     world.act("nobody", core(SAFE), release=True)
     assert world.core() == USUAL
+
+
+def test_a_rule_without_undo_leaves_only_what_was_in_force(world: World) -> None:
+    world.act("high", core(THIRD), priority=5)
+    world.act("low", core(SAFE), step(7.0))
+    world.act("low", core(SAFE), step(7.0), release=True)
+    assert (world.core(), world.step_of()) == (THIRD, 7.0)
+    world.act("high", release=True)
+    assert (world.core(), world.step_of()) == (USUAL, 7.0), "the core was outranked all the time"
+    world.act("low", core(SAFE))
+    world.act("high", core(THIRD), priority=5)
+    world.act("low", core(SAFE), release=True)
+    world.act("high", release=True)
+    assert world.core() == SAFE, "it was there before"

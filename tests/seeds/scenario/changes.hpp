@@ -299,7 +299,8 @@ class Changes : protected Checks {
   void carry_out(Dice& dice, Draft& draft, bool may_prepare, const Intervention& here) {
     const CommitTimeouts timeouts = draft.options.timeouts;
     time_ns_t longest_ns = 2 * timeouts.commit_ns + timeouts.phase_ns + kPrepare + kSlack;
-    if (two_change_) longest_ns *= 2;  // it waits for the other one's
+    if (two_change_)
+      longest_ns = 2 * longest_ns + (shared_->may_hang ? kCleanup : 0);  // it waits for the other one's
     // A change that a shutdown overtakes waits for the threads of its components.
     if (shuts_down_ || draft.owner == Owner::second) longest_ns += Runner::kThreadEnd;
     int way = draft.options.dry_run || draft.resynchronises ? 0 : dice.below(4);

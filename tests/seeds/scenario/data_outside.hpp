@@ -190,7 +190,7 @@ class DataOutside {
     }
   }
   void ask(const std::string& name) {
-    shared_.ask(name, -1, [&](const Question::Request& request, Question::Response& response) {
+    shared_.ask(name, kOutside, [&](const Question::Request& request, Question::Response& response) {
       return client(name).call.call(request, response);
     });
   }

@@ -40,9 +40,10 @@ class RuleHistory {
   static constexpr time_ns_t kLongestAction = ms_to_ns(300);
   static constexpr time_ns_t kSeen = ms_to_ns(40);  // from a write to the decision that it leads to
 
+  /// `rest_ns`: when the runner ended whose rules go on; kForever: none.
   RuleHistory(const std::vector<KnownRule>& rules, std::map<std::string, std::vector<Beat>>& beats,
-              seeds::Findings& findings)
-      : rules_(rules), beats_(beats), findings_(findings) {}
+              time_ns_t rest_ns, seeds::Findings& findings)
+      : rules_(rules), beats_(beats), rest_ns_(rest_ns), findings_(findings) {}
 
   void add(std::vector<rules::Told> told) { std::ranges::move(told, std::back_inserter(all_)); }
   /// `lost`: of the runner, which was stopped at that instant.
@@ -67,7 +68,10 @@ class RuleHistory {
     std::optional<rules::Act> under_way{};  // do or undo
     bool is_in_reserve{false};
     bool is_armed{false};
-    bool is_adopted{true};  // it may have been active before
+    bool is_adopted{true};    // it may have been active before
+    bool was_adopted{false};  // it was at work before
+    bool wants{false};        // what it does: as far as it has said so
+    time_ns_t armed_ns{0};    // since when its condition is looked at
     time_ns_t stamp_ns{0};
     time_ns_t begun_ns{0};
   };
@@ -95,6 +99,7 @@ class RuleHistory {
       case Decided::disarmed:
         expect(life.is_armed != (decision.decided == Decided::armed), what + "it was so before");
         life.is_armed = decision.decided == Decided::armed;
+        life.armed_ns = decision.stamp_ns;
         break;
       case Decided::do_:
       case Decided::undo:
@@ -104,8 +109,16 @@ class RuleHistory {
                  what + "the action of " + rules_[k].rule.name + " about the same is under way");
         life.under_way = decision.act;
         life.begun_ns = decision.stamp_ns;
-        if (!life.is_adopted) check_cause(decision, known, what);
+        if (!life.is_adopted && !ends_what_was(decision, life)) check_cause(decision, known, life, what);
+        life.wants = decision.act == Act::do_;
         if (decision.act == Act::undo) life.is_adopted = false;
+        break;
+      case Decided::suppressed:
+        if (decision.why == rules::Why::outranked || decision.why == rules::Why::already)
+          life.wants = decision.act == Act::do_;
+        break;
+      case Decided::adopted:
+        life.was_adopted = true;
         break;
       case Decided::condition_true:
         life.is_adopted = false;
@@ -131,8 +144,15 @@ class RuleHistory {
     }
   }
 
-  /// What begins has had its condition for long enough.
-  void check_cause(const rules::Decision& decision, const KnownRule& known, const std::string& what) {
+  /// What was in effect before, and no longer wanted, ends whatever the condition is: no turn of it is the cause.
+  static bool ends_what_was(const rules::Decision& decision, const Life& life) {
+    return life.was_adopted && decision.act == rules::Act::undo && decision.cause_ns == 0;
+  }
+
+  /// What begins has had its condition for long enough. What was so before the rule was armed is looked at from then on: of a rule that wants it still, and what came while no set
+  /// was at work.
+  void check_cause(const rules::Decision& decision, const KnownRule& known, const Life& life,
+                   const std::string& what) {
     const bool does = decision.decided == rules::Decided::do_;
     const time_ns_t dwell_ns = does ? known.rule.for_ns : known.rule.undo_for_ns;
     expect(decision.cause_ns == 0 || decision.stamp_ns - decision.cause_ns >= dwell_ns,
@@ -144,9 +164,10 @@ class RuleHistory {
     const time_ns_t slack_ns = kSeen + seeds::outcome().stalled_ns + still_wanted_ns + known.rule.cooldown_ns;
     bool was_so = false;
     for (std::size_t i = 0; i < beats.size(); ++i) {
-      const time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns + slack_ns : kForever;
+      time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns : kForever - slack_ns;
+      if (life.wants || end_ns >= rest_ns_ - kSeen) end_ns = std::max(end_ns, life.armed_ns);
       was_so = was_so || (known.holds(beats[i].value) == does && beats[i].began_ns <= decision.stamp_ns &&
-                          decision.stamp_ns <= end_ns);
+                          decision.stamp_ns <= end_ns + slack_ns);
     }
     expect(was_so, what + "its condition was not so, stamp " +
                        std::to_string(decision.stamp_ns / 1000 - 1'000'000'000));
@@ -154,6 +175,7 @@ class RuleHistory {
 
   const std::vector<KnownRule>& rules_;
   std::map<std::string, std::vector<Beat>>& beats_;
+  time_ns_t rest_ns_;
   seeds::Findings& findings_;
   std::vector<rules::Told> all_;
 };

@@ -29,6 +29,8 @@ inline constexpr std::array kRuleCores{"r/First",    "r/Good", "r/Other",   "r/R
                                        "r/Throwing", "r/Slow", "r/Hanging", "r/Stuck"};
 constexpr const char* name_of(RuleDeed deed) { return kRuleCores[static_cast<std::size_t>(deed)]; }
 
+constexpr bool is_bad(RuleDeed deed) { return deed > RuleDeed::other && deed != RuleDeed::slow; }
+
 struct RuleCore : Core<TestShell> {
   void act() {
     ++executions_;

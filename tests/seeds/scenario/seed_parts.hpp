@@ -219,11 +219,12 @@ class SeedCore : public Core<TestShell> {
 
   void compute(time_ns_t most_ns) noexcept { seeds::compute(dice_.between(0, most_ns)); }
   /// Others that preempt it make it slower.
-  void compute_slowly(time_ns_t length_ns) noexcept {
+  template <typename Pass>
+  void pass_slowly(time_ns_t length_ns, const Pass& pass) noexcept {
     shared_->slow_ns += length_ns;
     const time_ns_t until_ns = seeds::now_ns() + length_ns;
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    seeds::compute(length_ns);
+    pass(length_ns);
     const time_ns_t later_ns = seeds::now_ns() - until_ns - (seeds::outcome().stalled_ns - stalled_ns);
     shared_->slow_ns += std::max<time_ns_t>(0, later_ns);
   }
@@ -254,12 +255,10 @@ class SeedCore : public Core<TestShell> {
           } else {  // about as long as the bound of some states
             const time_ns_t length_ns =
                 dice_.between(BoundedStates::kLongest - us_to_ns(60), BoundedStates::kLongest + us_to_ns(60));
-            compute_slowly(length_ns);
+            pass_slowly(length_ns, seeds::compute);
           }
         } else {
-          const time_ns_t length_ns = dice_.between(us_to_ns(100), ms_to_ns(8));
-          shared_->slow_ns += length_ns;
-          sleep_for(length_ns);
+          pass_slowly(dice_.between(us_to_ns(100), ms_to_ns(8)), sleep_for);
         }
     }
     return true;

@@ -44,6 +44,8 @@ struct Thread {
   bool is_granted{false};           // a futex with priority inheritance
   const Thread* inherits{nullptr};  // who inherits its priority
   time_ns_t cpu_ns{0};
+  time_ns_t left_ns{0};  // the processor, last
+  time_ns_t kept_ns{0};  // from running, by others
   bool has_ended{false};
 };
 
@@ -245,12 +247,15 @@ Thread& choose() noexcept {
       std::swap(able[i], able[found]);
       std::swap(urgencies[i], urgencies[found]);
     }
-    return *able[wanted];
+    Thread& chosen = *able[wanted];
+    chosen.kept_ns += s.now_ns - std::max(chosen.ready_ns, chosen.left_ns);
+    return chosen;
   }
 }
 
 void reschedule() noexcept {
   Thread& before = self();
+  before.left_ns = all().now_ns;
   Thread& next = choose();
   if (&next == &before) return;
   pass_baton(next);
@@ -505,6 +510,7 @@ void wake_one(const void* address) noexcept {
 
 time_ns_t now_ns() noexcept { return all().now_ns; }
 time_ns_t cpu_ns() noexcept { return self().cpu_ns; }
+time_ns_t kept_ns() noexcept { return self().kept_ns; }
 
 Thread* start(const NewThread& made, int& error) {
   Scheduler& s = all();

@@ -73,7 +73,8 @@ struct OverlaySpec {
   bool ends_with_source{false};  // it is released when the source is gone
   bool latch{false};             // a person ends it
   std::vector<Assigned> assigns{};  // of several of one element the last one is its value
-  std::vector<Assigned> leaves{};   // becomes the base at its end ...
+  std::vector<Assigned>
+      leaves{};  // becomes the base at its end, its own value only where that was in force ...
   bool leaves_over_persons{false};  // ... else only where no person gave the element its base
 
   bool operator==(const OverlaySpec&) const = default;
@@ -109,6 +110,7 @@ enum class Activity : std::uint8_t {
 /// | ---------- | --------------------- | ------- | ------------------------------------------------------------------ |
 /// | activity_  | who decides; Overlays: ended -> inactive | all | release/acquire: who sees it active sees no base of later |
 /// | engaged_   | who decides           | all     | release/acquire: odd before anything is begun, even after it is over and described |
+/// | activations_ | who decides         | Overlays | release/acquire: what was in force before it grew is of an earlier activity |
 /// | outdated_  | who decides, Overlays | who prepares and who begins | release/acquire: what was found out before it was read may be of yesterday |
 /// | word_      | who decides, Overlays | who keeps the state         | release/acquire: who sees it grow sees the activity |
 class Overlay {
@@ -152,13 +154,19 @@ class Overlay {
   std::uint32_t engaged() const MAUVE_RT { return engaged_.load(std::memory_order_acquire); }
   const Assignment* find(const Element& element) const;
   bool has_given_back(const Element& element) const;
+  /// Whether its end leaves its own value: it has no `undo`.
+  bool leaves_own(const Assigned& left) const;
+  bool was_in_force(const Element& element) const;
 
   const OverlaySpec spec_;
   const std::shared_ptr<Atomic<std::uint32_t>> word_;  // of the Overlays, which it may outlive
   std::size_t order_{0};  // among those of equal priority; guarded by Overlays::mutex_
   std::vector<Element>
-      given_back_{};  // of the overlay that it takes the place of; guarded by Overlays::mutex_
+      given_back_{};                 // of the overlay that it takes the place of; guarded by Overlays::mutex_
+  std::vector<Element> in_force_{};  // what of it was there; guarded by Overlays::mutex_
+  std::uint32_t in_force_since_{0};  // the activation in which; guarded by Overlays::mutex_
   Atomic<Activity> activity_{Activity::inactive};
+  Atomic<std::uint32_t> activations_{0};
   Atomic<std::uint32_t> engaged_{0};
   Atomic<std::uint32_t> outdated_[2]{};
 };
@@ -249,11 +257,12 @@ class Overlays {
   using Look = std::map<const Overlay*, std::uint32_t>;
   /// Before a description is made. [non-rt]
   Look look() const;
-  /// Takes what the description shows as the base of elements on which no rule had its hand since the look. [non-rt]
+  /// Takes what the description shows as the base of elements on which no rule had its hand since the look, and finds which
+  /// values of active rules are in force. [non-rt]
   /// `faulted`: cores whose place the fallback has taken, which are rejected.
   void follow(const Look& before, const ArchitectureDescription& description,
               const std::vector<Authored>& authors, const std::vector<Assigned>& faulted);
-  /// A change that is in force, of somebody who is no rule. A stop is above all, until a start. [non-rt]
+  /// A change that is in force. Of somebody who is no rule, it is the base. A stop is above all, until a start. [non-rt]
   void note(const Assigned& assigned, const std::string& author);
 
   // ---- persons
@@ -315,7 +324,8 @@ class Overlays {
   void outdate(const Element& element) MAUVE_REQUIRES(mutex_);
   void note_rejected(const Assigned& assigned) MAUVE_REQUIRES(mutex_);
   void pardon(const Assigned& assigned) MAUVE_REQUIRES(mutex_);
-  bool may_leave(const Overlay& rule, const Element& element) const MAUVE_REQUIRES(mutex_);
+  bool may_leave(const Overlay& rule, const Assigned& left) const MAUVE_REQUIRES(mutex_);
+  void note_in_force(Overlay& rule, const Assigned& assigned) MAUVE_REQUIRES(mutex_);
 
   std::vector<Assigned> steps(const Overlay& rule, bool is_active) const MAUVE_REQUIRES(mutex_);
   void enter_wanted(std::vector<Assigned>& found, const Element& element, const std::string& kind,

@@ -83,6 +83,8 @@ class Action {
   bool has_no_steps() const noexcept { return tried_at_ != 0 && steps_.empty(); }
   /// Why it could not be prepared; empty: it could be, or that was not tried. [non-rt]
   const std::string& problem() const noexcept { return problem_; }
+  /// Whether another preparation may go better although nothing changes: one of others was in its way. [non-rt]
+  bool may_pass() const noexcept { return may_pass_; }
   /// What is kept prepared. [non-rt]
   std::size_t memory_bytes() const noexcept { return prepared_ != nullptr ? prepared_->memory_bytes() : 0; }
 
@@ -120,6 +122,7 @@ class Action {
   std::unique_ptr<TransactionCommit> committed_;
   std::optional<ActionReport> report_;
   std::string problem_;
+  bool may_pass_{false};       // the problem
   std::uint64_t tried_at_{0};  // the revision; 0: not yet
   Ended how_{Ended::done};
   Atomic<std::uint32_t> based_on_{0};

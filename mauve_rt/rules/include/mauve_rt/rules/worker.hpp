@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Worker: a thread that does one job each time that it is asked to.
+// Worker: a thread that does one job each time that it is asked to, and again when the job says so.
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
+#include "mauve_rt/base/time.hpp"
 
 namespace mauve::rules {
 
@@ -22,8 +23,8 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  /// The job throws nothing. [setup] Throws Error (internal): the system refuses the thread.
-  void start(const ThreadSettings& settings, std::function<void()> job);
+  /// The job throws nothing, and returns when it is to begin again at the latest. [setup] Throws Error (internal): the system refuses the thread.
+  void start(const ThreadSettings& settings, std::function<time_ns_t()> job);
   /// The job begins once more after this. [rt]
   void ask() MAUVE_RT;
   /// The job under way is the last one. [rt]
@@ -38,7 +39,7 @@ class Worker {
   void run() noexcept;
 
   Thread thread_;
-  std::function<void()> job_;
+  std::function<time_ns_t()> job_;
   Atomic<std::uint32_t> asked_{0};
   bool runs_{false};
 };

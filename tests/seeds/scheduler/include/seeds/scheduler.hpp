@@ -102,6 +102,8 @@ void wake_all(const void* address) noexcept;
 void wake_one(const void* address) noexcept;
 time_ns_t now_ns() noexcept;
 time_ns_t cpu_ns() noexcept;
+/// Of the calling thread: it could run, and others ran.
+time_ns_t kept_ns() noexcept;
 
 /// Null where the system refuses the thread; `error` says why.
 Thread* start(const NewThread& thread, int& error);
