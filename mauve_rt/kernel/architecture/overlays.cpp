@@ -208,6 +208,15 @@ void Overlay::set_active(bool is_active) noexcept {
   futex_wake_all(*word_);
 }
 
+/// This one is not in use yet: so relaxed.
+void Overlay::go_on_as(const Overlay& other) {
+  activity_.store(other.activity(), std::memory_order_relaxed);
+  engaged_.store(other.engaged(), std::memory_order_relaxed);
+  activations_.store(other.activations_.load(std::memory_order_acquire), std::memory_order_relaxed);
+  in_force_ = other.in_force_;
+  in_force_since_ = other.in_force_since_;
+}
+
 void Overlay::set_engaged(bool is_engaged) noexcept {
   const std::uint32_t before =
       engaged_.load(std::memory_order_relaxed);  // relaxed: this thread alone writes it
@@ -252,11 +261,7 @@ std::shared_ptr<Overlay> Overlays::next_of(const std::string& source, OverlaySpe
   auto next = std::make_shared<Overlay>(std::move(spec), word_);
   for (const auto& old : all_) {
     if (old->spec().source != source || old->spec().rule != next->spec().rule) continue;
-    next->activity_.store(old->activity(), std::memory_order_relaxed);  // relaxed: it is not in use yet
-    next->engaged_.store(old->engaged(), std::memory_order_relaxed);
-    next->activations_.store(old->activations_.load(std::memory_order_acquire), std::memory_order_relaxed);
-    next->in_force_ = old->in_force_;
-    next->in_force_since_ = old->in_force_since_;
+    next->go_on_as(*old);
     if (!old->is_engaged()) continue;
     next->given_back_ = old->given_back_;
     for (const Assigned& one : old->spec().assigns) next->given_back_.push_back(one.element);
@@ -571,8 +576,7 @@ bool Overlays::move(const std::string& rule, const std::string& from, const std:
     OverlaySpec spec = each->spec();
     spec.source = to;
     auto moved = std::make_shared<Overlay>(std::move(spec), word_);
-    moved->activity_.store(each->activity(), std::memory_order_relaxed);  // relaxed: it is not in use yet
-    moved->engaged_.store(each->engaged(), std::memory_order_relaxed);
+    moved->go_on_as(*each);
     moved->given_back_ = each->given_back_;
     moved->order_ = each->order_;
     each = std::move(moved);

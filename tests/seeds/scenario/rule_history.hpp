@@ -40,6 +40,9 @@ class RuleHistory {
   static constexpr time_ns_t kLongestAction = ms_to_ns(300);
   static constexpr time_ns_t kSeen = ms_to_ns(40);  // from a write to the decision that it leads to
 
+  static constexpr time_ns_t kStep =
+      ms_to_ns(1);  // the instant of a decision is read before the conditions are
+
   /// `rest_ns`: when the runner ended whose rules go on; kForever: none.
   RuleHistory(const std::vector<KnownRule>& rules, std::map<std::string, std::vector<Beat>>& beats,
               time_ns_t rest_ns, seeds::Findings& findings)
@@ -166,8 +169,9 @@ class RuleHistory {
     for (std::size_t i = 0; i < beats.size(); ++i) {
       time_ns_t end_ns = i + 1 < beats.size() ? beats[i + 1].began_ns : kForever - slack_ns;
       if (life.wants || end_ns >= rest_ns_ - kSeen) end_ns = std::max(end_ns, life.armed_ns);
-      was_so = was_so || (known.holds(beats[i].value) == does && beats[i].began_ns <= decision.stamp_ns &&
-                          decision.stamp_ns <= end_ns + slack_ns);
+      was_so =
+          was_so || (known.holds(beats[i].value) == does && beats[i].began_ns <= decision.stamp_ns + kStep &&
+                     decision.stamp_ns <= end_ns + slack_ns);
     }
     expect(was_so, what + "its condition was not so, stamp " +
                        std::to_string(decision.stamp_ns / 1000 - 1'000'000'000));

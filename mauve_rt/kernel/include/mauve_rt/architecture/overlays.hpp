@@ -151,6 +151,7 @@ class Overlay {
  private:
   friend class Overlays;
 
+  void go_on_as(const Overlay& other);
   std::uint32_t engaged() const MAUVE_RT { return engaged_.load(std::memory_order_acquire); }
   const Assignment* find(const Element& element) const;
   bool has_given_back(const Element& element) const;
