@@ -26,6 +26,7 @@ from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
 from mauve_rt.node.executor.rules import OwnRules
 from mauve_rt.node.executor.state_folder import StateFolder
+from mauve_rt.node.shared.loopback import udp_backlog
 from mauve_rt.supervision.truth import truth_word
 
 _ONE = ThresholdModel(warn=1)
@@ -55,6 +56,7 @@ class Diagnostics:
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
+        self._backlog = 0  # at the last status
 
     def publish(self, *, error: str = "") -> None:
         """Publish once; `error`: why the last lifecycle transition failed."""
@@ -287,6 +289,10 @@ class Diagnostics:
         usage = resource.getrusage(resource.RUSAGE_SELF)
         level = DiagnosticStatus.WARN if missing else DiagnosticStatus.OK
         message = "without real-time rights" if missing else "real-time rights granted"
+        before, self._backlog = self._backlog, udp_backlog()
+        if before and self._backlog:
+            level = DiagnosticStatus.WARN
+            message = f"a network interface stands still: {self._backlog} bytes wait, and more are dropped"
         if left_behind := self._runtime.threads_left_behind():
             level, message = (
                 DiagnosticStatus.WARN,
@@ -298,6 +304,7 @@ class Diagnostics:
             "revision": self._runtime.revision,
             "missing": "; ".join(missing),
             "threads_left_behind": left_behind,
+            "udp_backlog_bytes": self._backlog,
             "page_faults_major": usage.ru_majflt,
             "page_faults_minor": usage.ru_minflt,
             "allocation_counting": self._allocation_counting,

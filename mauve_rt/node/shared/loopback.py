@@ -146,14 +146,24 @@ def set_environment(variables: dict[str, str | None]) -> None:
 
 def udp_sockets(process: Path = _SELF) -> dict[str, str]:
     """The addresses that the UDP sockets of a process are bound to, by inode; none where /proc is missing."""
+    return {row[9]: _address(row[1].partition(":")[0]) for row in _udp_rows(process)}
+
+
+def udp_backlog(process: Path = _SELF) -> int:
+    """What the UDP sockets of a process have sent and the network interface has not, in bytes of memory."""
+    return sum(int(row[4].partition(":")[0], 16) for row in _udp_rows(process))
+
+
+def _udp_rows(process: Path) -> list[list[str]]:
+    """The lines of the kernel's tables about the sockets that a process holds, in words."""
     try:
         held = {_target(link) for link in (process / "fd").iterdir()}
         tables = [process / "net" / name for name in ("udp", "udp6")]
         lines = [line for table in tables if table.exists() for line in table.read_text("ascii").splitlines()]
     except OSError:
-        return {}
+        return []
     rows = [line.split() for line in lines]  # a heading has no socket of ours
-    return {row[9]: _address(row[1].partition(":")[0]) for row in rows if f"socket:[{row[9]}]" in held}
+    return [row for row in rows if f"socket:[{row[9]}]" in held]
 
 
 def reach(before: dict[str, str]) -> Reach:

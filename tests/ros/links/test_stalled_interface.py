@@ -13,6 +13,7 @@ from ros_processes import ExecutorProcess
 from waiting import wait_until
 
 from mauve_examples.mission.hosts import Hosts, HostsError
+from mauve_rt.node.shared.loopback import udp_backlog
 
 RANGE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 METRONOME = """\
@@ -96,6 +97,7 @@ def test_a_stalled_interface_holds_up_nothing_on_the_machine_itself(robot: Robot
     late_s = stalled_s + LASTS_S / 2
     wait_until(lambda: len(heard(robot.near, late_s)) > 100)
     assert len(heard(robot.far, late_s)) < 20, "the interface stands still"
+    assert udp_backlog(Path(f"/proc/{robot.executor.process.pid}")) > 0
     ended_s = time.monotonic()
     status, _ = robot.executor.end(signal.SIGTERM)
     assert status == 0
