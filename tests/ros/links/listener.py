@@ -1,26 +1,123 @@
-"""Writes a line for each message of a topic: when it came (s of CLOCK_MONOTONIC), and its value.
+"""An executor that minds, by a rule of its own, whether a talker speaks; each is a process."""
 
-listener.py TOPIC FILE
-"""
-
+import os
+import re
+import signal
+import subprocess
 import sys
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-import rclpy
-from rclpy.node import Node
-from std_msgs.msg import Float64
+from ros_processes import ExecutorProcess
+
+PATIENCE_S = 60.0
+_TOLD = re.compile(r"\[(\d+\.\d+)\] \[[\w.]*executor\]: quiet: (\w+): ")
+_ARCHITECTURE = """\
+mauve: 1
+components:
+  metronome: {shell: mauve_examples/MetronomeShell, core: mauve_examples/Metronome,
+              fsm: mauve_examples/MetronomeFsm, alternatives: [mauve_examples/Accelerando], priority: 20,
+              properties: {period_us: 10000}}
+resources:
+  heard: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: /talk, direction: subscribe, qos: QOS}}
+  beat: {kind: shared_data, type: std_msgs/msg/Float64}
+connections:
+  - [metronome.beat, beat.write]
+"""
+_RULES = """\
+mauve: 1
+rules:
+  - name: quiet
+    when: {silence: {topic: /talk, longer_than_s: LIMIT}}
+    do: [{kind: replace_core, target: metronome, name: mauve_examples/Accelerando}]
+    undo: {for_s: UNDO, do: [{kind: replace_core, target: metronome, name: mauve_examples/Metronome}]}
+"""
 
 
-def main() -> None:
-    topic, path = sys.argv[1:]
-    rclpy.init()
-    node = Node("listener")
-    with Path(path).open("w", encoding="utf-8", buffering=1) as file:
-        node.create_subscription(
-            Float64, topic, lambda message: file.write(f"{time.monotonic()} {message.data}\n"), 100
+class Listener:
+    """The executor."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *,
+        limit_s: float,
+        undo_s: float,
+        qos: str = "reliable",
+        wrapper: Sequence[str] = (),
+        environment: dict[str, str] | None = None,
+    ) -> None:
+        """Start it."""
+        architecture, rules = folder / "listener.yaml", folder / "rules.yaml"
+        architecture.write_text(_ARCHITECTURE.replace("QOS", qos), encoding="utf-8")
+        text = _RULES.replace("LIMIT", str(limit_s)).replace("UNDO", str(undo_s))
+        rules.write_text(text, encoding="utf-8")
+        self.executor = ExecutorProcess(
+            folder,
+            {"PYTHONUNBUFFERED": "1", **(environment or {})},
+            ["-p", f"architecture:={architecture}", "-p", f"rules:={rules}"],
+            wrapper=wrapper,
         )
-        rclpy.spin(node)
+
+    def decisions(self) -> list[str]:
+        """All of the rule so far."""
+        return [what for _, what in _TOLD.findall(self.executor.output)]
+
+    def count(self, decision: str) -> int:
+        """How often it has decided so."""
+        return self.decisions().count(decision)
+
+    def alarms(self) -> int:
+        """How often the condition has become true."""
+        return self.count("condition_true")
+
+    def until(self, condition: Callable[[], bool], what: str) -> None:
+        """Wait for it."""
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not condition():
+            assert self.executor.process.poll() is None, self.executor.output
+            assert time.monotonic() < deadline_s, f"gave up waiting for {what}:\n{self.executor.output}"
+            time.sleep(0.02)
+
+    def is_usual(self) -> bool:
+        """Whether the rule is armed, and what it did is undone."""
+        decisions = self.decisions()
+        done = decisions.count("done")
+        return "armed" in decisions and decisions.count("do") == decisions.count("undo") == done / 2
+
+    def process(self) -> int:
+        """The id of the executor's process, which a wrapper may have begun."""
+        return self.executor.process.pid
+
+    def close(self) -> None:
+        """End it by force."""
+        self.executor.process.kill()
+        self.executor.process.wait()
 
 
-main()
+class Talker:
+    """Speaks on /talk while it runs."""
+
+    def __init__(
+        self,
+        period_s: float,
+        *,
+        wrapper: Sequence[str] = (),
+        environment: dict[str, str] | None = None,
+    ) -> None:
+        """Start it."""
+        program = str(Path(__file__).with_name("talker.py"))
+        self._command = [*wrapper, sys.executable, program, "/talk", str(period_s)]
+        self._environment = os.environ | (environment or {})
+        self.start()
+
+    def start(self) -> None:
+        """Start it, or start it anew."""
+        self._process = subprocess.Popen(self._command, env=self._environment)
+
+    def signal(self, number: signal.Signals) -> None:
+        """Freeze, thaw or kill it."""
+        self._process.send_signal(number)
+        if number == signal.SIGKILL:
+            self._process.wait()

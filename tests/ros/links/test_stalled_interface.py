@@ -29,7 +29,7 @@ resources:
 connections:
   - [metronome.beat, beat.write]
 """
-LISTENER = Path(__file__).with_name("listener.py")
+LISTENER = Path(__file__).with_name("recorder_of_beats.py")
 _STALL = ["tc", "qdisc", "add", "dev", "cable", "root", "tbf", "rate", "1kbit", "burst", "2k"]
 LASTS_S = 4.0  # several times as long as the buffer of a socket takes to fill
 
