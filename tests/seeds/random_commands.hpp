@@ -199,12 +199,14 @@ class RandomCommands {
   /// Of one that was started: its thread may not know of that yet.
   void stop_at_once(std::size_t component) {
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
-    bool was_faulted = false;  // it may be repaired by now
+    bool was_faulted = false;  // it may be repaired by now, or be STOPPED while it is
     const bool is_done = attempt("stop at once " + name(component), kStop, [&] {
       try {
         deployer_->stop(name(component), {.timeout_ns = kStop});
       } catch (const Error& error) {
-        was_faulted = std::string(error.what()).find("found FAULTED") != std::string::npos;
+        const std::string words = error.what();
+        was_faulted =
+            words.find("found FAULTED") != std::string::npos || words.find("found STOPPED") != std::string::npos;
         throw;
       }
     });

@@ -164,14 +164,14 @@ def test_the_rule_that_is_not_active_has_nothing_to_release(world: World) -> Non
 
 
 def test_a_rule_without_undo_leaves_only_what_was_in_force(world: World) -> None:
-    world.act("high", core(THIRD), priority=5)
-    world.act("low", core(SAFE), step(7.0))
-    world.act("low", core(SAFE), step(7.0), release=True)
-    assert (world.core(), world.step_of()) == (THIRD, 7.0)
+    world.act("high", core(SAFE), priority=5)
+    world.act("low", core(THIRD), step(7.0))
+    world.act("low", core(THIRD), step(7.0), release=True)
+    assert (world.core(), world.step_of()) == (SAFE, 7.0)
     world.act("high", release=True)
     assert (world.core(), world.step_of()) == (USUAL, 7.0), "the core was outranked all the time"
     world.act("low", core(SAFE))
-    world.act("high", core(THIRD), priority=5)
+    world.act("high", core(USUAL), priority=5)
     world.act("low", core(SAFE), release=True)
     world.act("high", release=True)
     assert world.core() == SAFE, "it was there before"

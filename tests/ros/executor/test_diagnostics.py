@@ -4,13 +4,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import pytest
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 
 from mauve_msgs.srv import ReplaceCore
 from mauve_rt._kernel import allocation_counting
 from mauve_rt.control.requests import Code
-from mauve_rt.node.executor import diagnostics
 
 NODE = "/robot_1/executor"
 PARTS = ("counter", "guard", "sleepy")
@@ -110,17 +108,6 @@ def test_the_interpreter_s_allocations_are_no_warning(executor: Any, graph: Any)
     health.await_releases("counter", int(health.values("counter")["releases"]) + 100)
     told = [status for status in health.of("counter") if status.level == DiagnosticStatus.WARN]
     assert not [status.message for status in told if "allocations" in status.message]
-
-
-def test_bytes_that_wait_for_an_interface_are_warned_of(
-    executor: Any, graph: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Where they are at two looks; tests/ros/links has an interface that does stand still."""
-    waiting = iter([0, 4096, 0])
-    monkeypatch.setattr(diagnostics, "udp_backlog", lambda: next(waiting, 8192))
-    health = Health(graph)
-    health.await_remark("process", "a network interface stands still: 8192 bytes wait", DiagnosticStatus.WARN)
-    assert not health.remarks("process", "4096 bytes wait")
 
 
 def test_every_status_has_a_name_of_its_own(
