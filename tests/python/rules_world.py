@@ -181,6 +181,8 @@ class World:
         self._overlays.settle_ended()
         for step in steps:
             self._do(step)
+            if not request.release:
+                self._overlays.note(step, f"rule {request.rule}")
 
     def set_already(self, rule: Rule) -> None:
         """A supervisor before this one has set the rule, or another supervisor."""

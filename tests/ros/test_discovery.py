@@ -177,14 +177,31 @@ def _received_ns(port: socket.socket) -> int:
     return int(seconds * 10**9 + nanoseconds)
 
 
-def test_a_profile_of_the_users_own_is_kept_and_what_is_open_is_told(domain: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("profile", [OWN_PROFILE, "", "no XML", None])
+@pytest.mark.parametrize("said", [{}, {RANGE: "LOCALHOST"}])
+def test_a_profile_that_opens_what_was_to_stay_here_ends_the_executor(
+    profile: str | None, said: dict[str, str], domain: int, tmp_path: Path
+) -> None:
+    """One that is missing, empty, or says nothing of transports: Fast DDS listens on every address then."""
+    own = tmp_path / "own.xml"
+    if profile is not None:
+        own.write_text(profile, encoding="utf-8")
+    said = said | {PROFILES: str(own), "ROS_DOMAIN_ID": str(domain)}
+    with _running(tmp_path, _words("executor", tmp_path), said) as (process, log):
+        assert process.wait(PATIENCE_S) == 2
+        text = log.read_text("utf-8")
+        assert "executor: not on this machine only: UDP bound to 0.0.0.0" in text
+        assert f"as {PROFILES}={own} takes the place of the project's profile" in text
+        assert f"Set {RANGE}=SUBNET to let them in" in text
+
+
+def test_a_profile_of_the_users_own_is_kept_where_others_may_come_in(domain: int, tmp_path: Path) -> None:
     own = tmp_path / "own.xml"
     own.write_text(OWN_PROFILE, encoding="utf-8")
-    said = {RANGE: "LOCALHOST", PROFILES: str(own), "ROS_DOMAIN_ID": str(domain)}
+    said = {RANGE: "SUBNET", PROFILES: str(own), "ROS_DOMAIN_ID": str(domain)}
     with _running(tmp_path, _words("executor", tmp_path), said) as (process, log):
         assert "0.0.0.0" in _begin(process, log, domain)[0]  # noqa: S104 - as Fast DDS has it
-        _wait_until_logged(f"as {PROFILES}={own} takes the place of the project's profile", process, log)
-        assert "not on this machine only: UDP bound to 0.0.0.0" in log.read_text("utf-8")
+        _wait_until_logged(f"{PROFILES}={own} has no <non_blocking_send>true", process, log)
 
 
 @pytest.mark.parametrize("program", sorted(PROGRAMS.keys() - {"mauve"}))  # loads the middleware before

@@ -14,6 +14,7 @@ from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
 from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.node.shared.watch import Watch
 
 if TYPE_CHECKING:  # an executor without rules has no use for these, a tenth of its modules
@@ -308,13 +309,36 @@ def _silent(rules: Sequence["Rule"], topics: Mapping[str, str]) -> set[str]:
     return {str(one.get("resource") or topics.get(str(one.get("topic")), "")) for one in silences} - {""}
 
 
+def _may_be_shown(file: Path) -> bool:
+    """Whether a reply may quote a file: it is there and looks like rules, or it is no file at all.
+
+    Who asks may be another account of this machine, which must not read files of the executor's account so.
+    """
+    if not file.is_file():
+        return True
+    try:
+        data = YamlFile(file, waits=False).data
+    except ArchitectureFileError:
+        return False
+    return isinstance(data, dict) and {"mauve", "rules"} <= data.keys()
+
+
+def _without_content(error: ArchitectureFileError) -> str:
+    return (
+        f"{error.file}:{error.line}:{error.column}: this is no rules file, so its content is not shown; "
+        f"on the executor's computer `mauve rules check {error.file}` shows more"
+    )
+
+
 def load_reply(rules: OwnRules, path: str, release: Sequence[str] = ()) -> tuple[Code, str]:
     """What comes of loading a file: the code and the words of a reply."""
     try:
         count = rules.load(path, release)
     except ActiveSafetyRuleError as error:
         return Code.ACTIVE_SAFETY_RULE, str(error)
-    except (ArchitectureFileError, ParameterError) as error:
+    except ArchitectureFileError as error:
+        return Code.INVALID, str(error) if _may_be_shown(error.file) else _without_content(error)
+    except ParameterError as error:
         return Code.INVALID, str(error)
     except MauveError as error:
         return Code.PREPARE_FAILED, str(error)

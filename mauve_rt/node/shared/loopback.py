@@ -47,11 +47,10 @@ class Reach(NamedTuple):
     """How far a program reaches, as its sockets have it."""
 
     text: str
-    is_warning: bool
 
     def log(self, logger: Any) -> None:
         """Write it to the log of a node."""
-        (logger.warning if self.is_warning else logger.info)(self.text)
+        logger.info(self.text)
         if waits := waiting_transport():
             logger.warning(_WAITING.format(waits))
 
@@ -72,7 +71,7 @@ def keep_to_this_machine() -> None:
 def loopback_environment(*, shared_memory: bool = True) -> dict[str, str | None]:
     """The variables that bind to loopback (None: to be removed); none where the program reaches further.
 
-    A profile of the user's own is left alone: `reach` reports what is bound then.
+    A profile of the user's own is left alone: `reach` refuses one that binds other addresses.
 
     Raises:
         LoopbackError: the middleware cannot be bound so.
@@ -170,15 +169,13 @@ def reach(before: dict[str, str]) -> Reach:
     """How far the program reaches by the sockets that it has, but for those it had before its node.
 
     Raises:
-        LoopbackError: they are to be bound to loopback and are not.
+        LoopbackError: they are to be bound to loopback and are not, by whatever profile.
     """
     now = udp_sockets()
     addresses = sorted({now[inode] for inode in now.keys() - before.keys()})
     bound = f"UDP bound to {', '.join(addresses) or 'no address'}"
     if addresses and all(address.startswith("127.") for address in addresses):
-        return Reach(
-            f"on this machine only: {bound}; {RANGE}=SUBNET lets other machines in", is_warning=False
-        )
+        return Reach(f"on this machine only: {bound}; {RANGE}=SUBNET lets other machines in")
     if has_own_profile() and addresses:
         raise LoopbackError(
             f"{bound} in spite of {PROFILES}={os.environ[PROFILES]}; is this file readable XML?"
@@ -186,13 +183,15 @@ def reach(before: dict[str, str]) -> Reach:
     opened = opened_by()
     if opened:
         text = f"discovery beyond this machine ({opened}): without DDS Security anyone there can reconfigure"
-        return Reach(f"{text}; {bound}", is_warning=False)
+        return Reach(f"{text}; {bound}")
     profile = users_profile()
     if profile and addresses:
-        remedy = f"To close it, set {RANGE}=SYSTEM_DEFAULT and a profile as share/mauve_rt/dds/local.xml"
-        text = f"not on this machine only: {bound}, as {profile} takes the place of the project's profile"
-        return Reach(f"{text}. Other machines can reconfigure. {remedy}.", is_warning=True)
-    return Reach(f"discovery stays on this machine; {bound}", is_warning=False)
+        raise LoopbackError(
+            f"not on this machine only: {bound}, as {profile} takes the place of the project's profile, so "
+            f"other machines could reconfigure. Set {RANGE}=SUBNET to let them in, or unset the profile, or "
+            f"set {RANGE}=SYSTEM_DEFAULT and give your profile the transports of share/mauve_rt/dds/local.xml."
+        )
+    return Reach(f"discovery stays on this machine; {bound}")
 
 
 def _target(link: Path) -> str:

@@ -42,7 +42,8 @@ OUTSIDE = {
 
 def checked(check: Check, leaf: str, *, where: str = "executor", robot: str = WIDE) -> list[str]:
     """What is wrong with a rule that waits for this, and no bound."""
-    text = rule(when=f"{{{leaf.replace('^', '')}}}", more=f"    in: {where}\n    cooldown_s: 1\n")
+    undo = "    undo: {for_s: 1.0}\n"
+    text = rule(undo=undo, when=f"{{{leaf.replace('^', '')}}}", more=f"    in: {where}\n    cooldown_s: 1\n")
     status, _, errors = check(text, robot=robot)
     assert status == bool(errors)
     return errors

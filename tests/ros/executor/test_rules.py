@@ -384,6 +384,31 @@ def test_leaves_alone_what_an_operator_did(start: Start, graph: Any, files: tupl
     assert robot.core() == SAFE
 
 
+@pytest.mark.parametrize(
+    "content",
+    [
+        "machine git.example.org login robot password hunter2",
+        "DB_PASSWORD=hunter2\n",
+        "hunter2\n",
+        "password: hunter2\n",
+        "rules: hunter2\n",
+        "-----BEGIN KEY-----\n\thunter2: [\n",
+    ],
+)
+def test_a_reply_shows_nothing_of_a_file_that_holds_no_rules(
+    start: Start, graph: Any, tmp_path: Path, content: str
+):
+    """Who asks may be an account that must not read it."""
+    start()
+    other = tmp_path / "other"
+    other.write_text(content, encoding="utf-8")
+    reply = graph.ask(LoadRules, f"{NODE}/load_rules", path=str(other))
+    assert (reply.success, reply.code) == (False, Code.INVALID)
+    assert reply.message.startswith(f"{other}:")
+    assert "its content is not shown" in reply.message
+    assert not any(word in reply.message for word in ("hunter2", "password", "machine", "KEY"))
+
+
 def test_rules_are_loaded_anew_whole_or_not_at_all(start: Start, graph: Any, files: tuple[Path, Path]):
     robot = start()
     robot.await_said("armed")
