@@ -188,8 +188,8 @@ def reach(before: dict[str, str]) -> Reach:
     if profile and addresses:
         raise LoopbackError(
             f"not on this machine only: {bound}, as {profile} takes the place of the project's profile, so "
-            f"other machines could reconfigure. Set {RANGE}=SUBNET to let them in, or unset the profile, or "
-            f"set {RANGE}=SYSTEM_DEFAULT and give your profile the transports of share/mauve_rt/dds/local.xml."
+            f"other machines could reconfigure. Set {RANGE}=SUBNET to let them in, unset the profile, or "
+            f"set {RANGE}=SYSTEM_DEFAULT and give it profile the transports of share/mauve_rt/dds/local.xml."
         )
     return Reach(f"discovery stays on this machine; {bound}")
 
