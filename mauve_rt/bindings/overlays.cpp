@@ -89,6 +89,7 @@ void bind_values(py::module_& module) {
       .def_property_readonly("rules",
                              [](const KeptState& self) {
                                std::vector<std::string> names;
+                               names.reserve(self.active.size());
                                for (const OverlaySpec& each : self.active) names.push_back(each.rule);
                                return names;
                              })

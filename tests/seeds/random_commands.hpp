@@ -205,8 +205,8 @@ class RandomCommands {
         deployer_->stop(name(component), {.timeout_ns = kStop});
       } catch (const Error& error) {
         const std::string words = error.what();
-        was_faulted =
-            words.find("found FAULTED") != std::string::npos || words.find("found STOPPED") != std::string::npos;
+        was_faulted = words.find("found FAULTED") != std::string::npos ||
+                      words.find("found STOPPED") != std::string::npos;
         throw;
       }
     });

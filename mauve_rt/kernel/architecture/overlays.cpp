@@ -511,18 +511,10 @@ KeptState Overlays::kept(const ArchitectureDescription& file) const {
 std::vector<KeptBase> Overlays::restore(const KeptState& state, const std::set<std::string>& rules,
                                         const ArchitectureDescription& file) {
   const LockGuard lock(mutex_);
-  const auto base_on_file = [&](const Assigned& one) {
-    const auto& [target, name] = one.element;
-    if (target.empty() || bases_.contains(one.element)) return;
-    const bool is_state = name == kState;  // all start at the activation
-    change_base(
-        one.element,
-        is_state ? std::optional(Assignment{.kind = "start", .target = target}) : present(file, one.element),
-        {});
-  };
   for (OverlaySpec spec : state.active) {
-    for (const auto* steps : {&spec.assigns, &spec.leaves})
-      std::for_each(steps->begin(), steps->end(), base_on_file);
+    for (const auto* steps : {&spec.assigns, &spec.leaves}) {
+      for (const Assigned& one : *steps) base_on(file, one.element);
+    }
     if (spec.source != kHeldStopped) spec.source = rules.contains(spec.rule) ? "" : std::string(kKept);
     auto overlay = std::make_shared<Overlay>(std::move(spec), word_);
     overlay->set_engaged(true);
@@ -531,7 +523,7 @@ std::vector<KeptBase> Overlays::restore(const KeptState& state, const std::set<s
     all_.push_back(std::move(overlay));
   }
   rejected_ = state.rejected;
-  std::for_each(rejected_.begin(), rejected_.end(), base_on_file);
+  for (const Assigned& one : rejected_) base_on(file, one.element);
   std::vector<KeptBase> left_out;
   for (const KeptBase& base : state.bases) {
     const std::optional<Assignment> now = present(file, base.assigned.element);
@@ -546,23 +538,32 @@ std::vector<KeptBase> Overlays::restore(const KeptState& state, const std::set<s
   return left_out;
 }
 
+/// The base of an element that has none yet: as the file says; all start at the activation.
+void Overlays::base_on(const ArchitectureDescription& file, const Element& element) {
+  if (element.target.empty() || bases_.contains(element)) return;
+  if (element.name == kState)
+    return change_base(element, Assignment{.kind = "start", .target = element.target}, {});
+  change_base(element, present(file, element), {});
+}
+
 std::vector<std::pair<std::string, Assignment>> Overlays::restoring_steps(
     const ArchitectureDescription& description) const {
   const LockGuard lock(mutex_);
+  std::vector<Element> elements;
+  for (const Overlay* rule : ranked({})) {
+    for (const Assigned& one : rule->spec().assigns) elements.push_back(one.element);
+  }
+  for (const auto& [element, base] : bases_) elements.push_back(element);
   std::vector<Assigned> found;
   std::map<Element, std::string> authors;
-  const auto enter = [&](const Element& element) {
-    if (element.target.empty() || element.name == kState || authors.contains(element)) return;
+  for (const Element& element : elements) {
+    if (element.target.empty() || element.name == kState || authors.contains(element)) continue;
     const Wanted now = wanted(element, {});
-    const auto base = bases_.find(element);
-    if (!now.step || (now.by != Wanted::By::rule && now.by != Wanted::By::base)) return;
-    authors[element] = now.by == Wanted::By::rule ? std::string(kByRule) + now.rule : base->second.author;
+    if (!now.step || (now.by != Wanted::By::rule && now.by != Wanted::By::base)) continue;
+    authors[element] =
+        now.by == Wanted::By::rule ? std::string(kByRule) + now.rule : bases_.find(element)->second.author;
     found.push_back({element, *now.step});
-  };
-  for (const Overlay* rule : ranked({})) {
-    for (const Assigned& one : rule->spec().assigns) enter(one.element);
   }
-  for (const auto& [element, base] : bases_) enter(element);
   std::vector<std::pair<std::string, Assignment>> steps;
   for (const Assigned& one : differences(in_order(found), description))
     steps.emplace_back(authors[one.element], one.step);

@@ -215,7 +215,7 @@ void read_record(KeptState& state, Words words) {
 class Descriptor {
  public:
   Descriptor(const std::filesystem::path& path, int flags)
-      : number_(::open(path.c_str(), flags | O_CLOEXEC, 0644)) {}
+      : number_(::open(path.c_str(), flags, 0644)) {}
   ~Descriptor() {
     if (number_ >= 0) ::close(number_);
   }
@@ -293,7 +293,7 @@ KeptState kept_state_of(std::string_view text) {
 }
 
 std::optional<KeptState> read_state_file(const std::filesystem::path& path) {
-  const Descriptor file(path, O_RDONLY);
+  const Descriptor file(path, O_RDONLY | O_CLOEXEC);
   if (!file.is_open() && errno == ENOENT) return std::nullopt;
   std::string text;
   if (!file.is_open() || !file.read(text)) damaged(std::generic_category().message(errno));
@@ -308,7 +308,7 @@ void write_state_file(const std::filesystem::path& path, std::string_view text) 
   std::filesystem::path beside = path;
   beside += ".new";
   {
-    const Descriptor file(beside, O_WRONLY | O_CREAT | O_TRUNC);
+    const Descriptor file(beside, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC);
     if (!file.is_open() || !file.write(text) || !file.sync()) {
       const int error = errno;
       ::unlink(beside.c_str());
@@ -316,7 +316,7 @@ void write_state_file(const std::filesystem::path& path, std::string_view text) 
     }
   }
   if (std::rename(beside.c_str(), path.c_str()) != 0) fail_to_write(path, errno);
-  const Descriptor directory(folder, O_RDONLY | O_DIRECTORY);
+  const Descriptor directory(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (!directory.is_open() || !directory.sync()) fail_to_write(path, errno);
 }
 

@@ -326,6 +326,7 @@ class Overlays {
   void note_rejected(const Assigned& assigned) MAUVE_REQUIRES(mutex_);
   void pardon(const Assigned& assigned) MAUVE_REQUIRES(mutex_);
   bool may_leave(const Overlay& rule, const Assigned& left) const MAUVE_REQUIRES(mutex_);
+  void base_on(const ArchitectureDescription& file, const Element& element) MAUVE_REQUIRES(mutex_);
   void note_in_force(Overlay& rule, const Assigned& assigned) MAUVE_REQUIRES(mutex_);
 
   std::vector<Assigned> steps(const Overlay& rule, bool is_active) const MAUVE_REQUIRES(mutex_);
