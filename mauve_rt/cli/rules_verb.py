@@ -48,9 +48,9 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 
 def _check(args: argparse.Namespace) -> int:
     from mauve_rt.model import load_architecture  # noqa: PLC0415
+    from mauve_rt.supervision.rule_cautions import form_warnings, model_warnings  # noqa: PLC0415
     from mauve_rt.supervision.rule_checks import logic_findings  # noqa: PLC0415
     from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
-    from mauve_rt.supervision.rule_cautions import form_warnings, model_warnings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(args.file)

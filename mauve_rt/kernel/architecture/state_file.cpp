@@ -214,8 +214,7 @@ void read_record(KeptState& state, Words words) {
 /// An open file or folder.
 class Descriptor {
  public:
-  Descriptor(const std::filesystem::path& path, int flags)
-      : number_(::open(path.c_str(), flags, 0644)) {}
+  Descriptor(const std::filesystem::path& path, int flags) : number_(::open(path.c_str(), flags, 0644)) {}
   ~Descriptor() {
     if (number_ >= 0) ::close(number_);
   }
