@@ -70,7 +70,9 @@ def test_who_hears_nothing_acts_once_and_comes_back(outcomes: dict[str, Future[O
     outcome = outcome_of(outcomes, name)
     assert acted_as_expected(name, outcome), outcome.told
     for robot in ACTING[name]:
-        [done], [undone] = (outcome.instants(robot, what) for what in ("do", "undo"))
+        decided = [outcome.instants(robot, what) for what in ("do", "undo")]
+        assert list(map(len, decided)) == [1, 1], outcome.told
+        [done], [undone] = decided
         # The last message came at most its period of 0.1 s before the cause.
         assert done - outcome.began_s > SILENCE_S - 0.1 - LATE_S
         assert undone - outcome.mended_s > UNDO_S - LATE_S
