@@ -150,11 +150,10 @@ goes on, and what it receives in between counts. It is of no use afterwards, and
             return self.runner().tell(signal, time_ns, value);
           },
           py::arg("signal"), py::arg("time_ns"), py::arg("value") = 0.0,
-          "Of rules that are told: one of `signals` reports a value. Whether advance() has something to "
-          "decide.")
+          "With `told`: one of `signals` reports a value. Whether advance() has something to decide.")
       .def(
           "adopt", [](PyRuleRunner& self, std::size_t rule) { self.runner().adopt(rule); }, py::arg("rule"),
-          "The same: the rule is active since before, and the architecture is as it wants it.")
+          "With `told`: the rule is active since before, and the architecture is as it wants it.")
       .def(
           "advance", [](PyRuleRunner& self) { return self.runner().advance(); }, Unlocked(),
           "In virtual time: do all that is due now; when to call again at the latest.");

@@ -91,14 +91,11 @@ def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
-    from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
-    from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
+    from mauve_rt.supervision.rule_findings import all_findings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(path)
-    found = standing_findings(file, model)
-    if model is not None:
-        found += rehearsal_problems(file, model)
+    found = all_findings(file, model)
     if found:
         raise ArchitectureFileError(path, found)
     print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")

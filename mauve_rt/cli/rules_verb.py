@@ -129,11 +129,10 @@ def _checked_model(file: "RulesFile", architecture: Path | None) -> "Architectur
     if architecture is None:
         return None
     from mauve_rt.model import load_architecture  # noqa: PLC0415
-    from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415
-    from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
+    from mauve_rt.supervision.rule_findings import all_findings  # noqa: PLC0415
 
     model = load_architecture(architecture)
-    if problems := [*standing_findings(file, model), *rehearsal_problems(file, model)]:
+    if problems := all_findings(file, model):
         raise ArchitectureFileError(file.path, problems)
     return model
 

@@ -16,7 +16,7 @@ from mauve_rt._kernel import (
     read_state_file,
 )
 from mauve_rt.control.limits import RequestLimits
-from mauve_rt.control.requests import RefusalError
+from mauve_rt.control.requests import BY_RULE, RefusalError
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.steps import Plan
 from mauve_rt.control.wishes import step_of
@@ -24,7 +24,6 @@ from mauve_rt.errors import MauveError, one_line
 from mauve_rt.model.steps import Step
 
 _ABOVE_ALL = 2**62  # priority of what holds components stopped
-_RULE = "rule "
 
 
 class Remark(NamedTuple):
@@ -138,13 +137,13 @@ def _make(runtime: Runtime, wanted: Sequence[tuple[str, ActionStep]]) -> list[Re
         by_author.setdefault(author, []).append(step_of(step))
     remarks = []
     for author, steps in by_author.items():
-        is_rule = author.startswith(_RULE)
+        is_rule = author.startswith(BY_RULE)
         if not (why := _commit(runtime, author, steps)):
             if not is_rule:
                 words = "; ".join(map(str, steps))
                 remarks.append(Remark("info", f"as before the restart, by {author}: {words}"))
         elif is_rule:
-            rule = author.removeprefix(_RULE)
+            rule = author.removeprefix(BY_RULE)
             targets = {
                 step.target
                 for overlay in runtime.architecture.overlays.active()

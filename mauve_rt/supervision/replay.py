@@ -13,8 +13,8 @@ from mauve_rt._kernel import Simulation
 from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.explanation import StoryEntry
 from mauve_rt.supervision.recorded_signals import RecordedSignals
+from mauve_rt.supervision.rehearsed_rules import RehearsedRules
 from mauve_rt.supervision.rules import Rule, RulesFile
-from mauve_rt.supervision.simulated_rules import SimulatedRules
 from mauve_rt.supervision.stand_ins import StandInRuntime
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.trace.reading.trace import Trace
@@ -121,7 +121,7 @@ class _Replay:
             if not self._runs_first(name):
                 runtime.host.stop(name)
         self._later_ns = simulation.now_ns() - trace.span_ns[0]  # than in the bag
-        self._rules = SimulatedRules(
+        self._rules = RehearsedRules(
             simulation, runtime, file, self._note, left_out=left_out, hears_states=False
         )
 

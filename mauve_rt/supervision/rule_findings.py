@@ -8,6 +8,20 @@ from mauve_rt.supervision.rule_names import name_findings
 from mauve_rt.supervision.rules import RulesFile
 
 
+def all_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Problem]:
+    """Those of standing_findings(), and what the executor of `model` would refuse.
+
+    Raises:
+        ArchitectureFileError: the architecture cannot be built or configured.
+    """
+    found = standing_findings(file, model)
+    if model is not None:
+        from mauve_rt.supervision.rehearsal import rehearsal_problems  # noqa: PLC0415 - it needs a simulation
+
+        found += rehearsal_problems(file, model)
+    return found
+
+
 def standing_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Problem]:
     """Names that are not there, and what who runs a rule can neither hear nor make ready."""
     plugins = PluginIndex.installed()

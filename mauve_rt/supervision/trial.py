@@ -9,10 +9,10 @@ from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.supervision.decisions import Decision
+from mauve_rt.supervision.rehearsed_rules import RehearsedRules
 from mauve_rt.supervision.rule_hearing import only_outside
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.supervision.script import Heard, Script
-from mauve_rt.supervision.simulated_rules import SimulatedRules
 from mauve_rt.supervision.stand_ins import StandInRuntime
 
 COLUMNS = 60
@@ -47,7 +47,7 @@ class Trial:
             runtime.configure()
             runtime.activate()
             self._begin_ns = self._simulation.now_ns()
-            self._rules = SimulatedRules(self._simulation, runtime, file, self._note)
+            self._rules = RehearsedRules(self._simulation, runtime, file, self._note)
             self._run()
         finally:
             self._simulation.shutdown()

@@ -16,7 +16,7 @@ COMPONENT_STATES: Mapping[str, int] = {
 
 
 class ViewSignals:
-    """The signals of an engine, or of a runner that is told, about states and changes."""
+    """The signals of an engine, or of a runner whose caller feeds it, about states and changes."""
 
     def __init__(self, engine: RuleEngine | RuleRunner) -> None:
         self._engine = engine

@@ -166,6 +166,17 @@ class RuleRunnerTest : public Hosted<Way> {
     };
     this->way.until(is_ready, "the action to be ready");
   }
+  /// A rule without `undo` that puts in Counting, below one that puts in Counted and undoes that.
+  void begin_counting_below_counted(When counting, When counted) {
+    add_rule(std::move(counting), {}, core("t/Counting"));
+    add_rule(std::move(counted), {}, core("t/Counted"));
+    rules.back().undoes = true;
+    rules.back().priority = 9;
+    this->deploy();
+    begin();
+    await_ready(0);
+    await_ready(1);
+  }
   void commit_by(const std::string& author, const ActionSteps& steps) {
     this->host().commit(std::move(make_transaction(steps).by(author)), {});
   }
@@ -616,14 +627,7 @@ TYPED_TEST(RuleRunnerTest, FromAHigherRulesEndItGoesStraightToTheLowerOnesWant) 
 }
 
 TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {
-  this->add_rule(too_high(10.0), {}, core("t/Counting"));
-  this->add_rule(too_high(3.0), {}, core("t/Counted"));
-  this->rules.back().undoes = true;
-  this->rules.back().priority = 9;
-  this->deploy();
-  this->begin();
-  this->await_ready(0);
-  this->await_ready(1);
+  this->begin_counting_below_counted(too_high(10.0), too_high(3.0));
   const auto await_active = [this](bool is_expected) {
     const auto is_so = [this, is_expected] {
       this->take();
@@ -642,14 +646,7 @@ TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {
 }
 
 TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesWhatWasInForceBelowAnother) {
-  this->add_rule(too_high(3.0), {}, core("t/Counting"));
-  this->add_rule(too_high(10.0), {}, core("t/Counted"));
-  this->rules.back().undoes = true;
-  this->rules.back().priority = 9;
-  this->deploy();
-  this->begin();
-  this->await_ready(0);
-  this->await_ready(1);
+  this->begin_counting_below_counted(too_high(3.0), too_high(10.0));
   this->beat.write.write({.value = 4.0}, 1);
   this->until_there("t/Counting");
   this->beat.write.write({.value = 20.0}, 1);

@@ -94,6 +94,12 @@ bool is_kept_base(const Element& element) {
          element.name.starts_with("property ") || element.name.starts_with("port ");
 }
 
+/// Wakes who waits for another state.
+void bump_word(Atomic<std::uint32_t>& word) noexcept {
+  word.fetch_add(1, std::memory_order_release);
+  futex_wake_all(word);
+}
+
 constexpr int kLastPlace = 6;
 /// In which order steps are safe whatever they undo: what is added first, what runs and what goes last.
 int place_of(const Assignment& step) {
@@ -204,8 +210,7 @@ void Overlay::set_active(bool is_active) noexcept {
   const Activity after = is_active ? Activity::active : Activity::ended;
   if (is_active) activations_.fetch_add(1, std::memory_order_release);
   activity_.store(after, std::memory_order_release);
-  word_->fetch_add(1, std::memory_order_release);
-  futex_wake_all(*word_);
+  bump_word(*word_);
 }
 
 /// This one is not in use yet: so relaxed.
@@ -485,10 +490,7 @@ bool Overlays::is_covered(const Element& element) const {
 
 // ---- over a restart
 
-void Overlays::bump() noexcept {
-  word_->fetch_add(1, std::memory_order_release);
-  futex_wake_all(*word_);
-}
+void Overlays::bump() noexcept { bump_word(*word_); }
 
 KeptState Overlays::kept(const ArchitectureDescription& file) const {
   const LockGuard lock(mutex_);
@@ -625,9 +627,9 @@ void Overlays::follow(const Look& before, const ArchitectureDescription& descrip
     for (const Assigned& one : each->spec().assigns) {
       if (one.element.target.empty() || !each->is_active()) continue;
       const Wanted now = wanted(one.element, {});
+      if (now.by != Wanted::By::rule || now.rule != each->spec().rule) continue;
       const std::optional<Assignment> there = present(description, one.element);
-      const bool is_its = now.by == Wanted::By::rule && now.rule == each->spec().rule;
-      if (is_its && there && is_same_effect(*there, one.step)) note_in_force(*each, one);
+      if (there && is_same_effect(*there, one.step)) note_in_force(*each, one);
     }
     if (!was_free(*each, before)) continue;
     each->given_back_.clear();

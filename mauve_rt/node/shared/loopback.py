@@ -189,7 +189,7 @@ def reach(before: dict[str, str]) -> Reach:
         raise LoopbackError(
             f"not on this machine only: {bound}, as {profile} takes the place of the project's profile, so "
             f"other machines could reconfigure. Set {RANGE}=SUBNET to let them in, unset the profile, or "
-            f"set {RANGE}=SYSTEM_DEFAULT and give it profile the transports of share/mauve_rt/dds/local.xml."
+            f"set {RANGE}=SYSTEM_DEFAULT and give it the transports of share/mauve_rt/dds/local.xml."
         )
     return Reach(f"discovery stays on this machine; {bound}")
 

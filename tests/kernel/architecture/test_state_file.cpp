@@ -35,7 +35,7 @@ Assigned stop(const std::string& component) {
   return {.element = {.target = component, .name = "state"}, .step = {.kind = "stop", .target = component}};
 }
 
-/// All kinds of values and records, and names that nobody should use.
+/// All kinds of values and records, and names with odd characters.
 KeptState full_state() {
   std::string every_byte;
   for (int byte = 0; byte < 256; ++byte) every_byte += static_cast<char>(byte);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// What is decided is in the file soon after, whoever decides.
+// What is decided, by a rule or a person, is in the file soon after.
 #include <unistd.h>
 
 #include "mauve_rt/architecture/state_file.hpp"

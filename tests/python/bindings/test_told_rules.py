@@ -1,4 +1,4 @@
-"""A RuleRunner whose conditions are told what they hear, in virtual time."""
+"""A RuleRunner whose caller feeds its conditions, in virtual time."""
 
 from collections.abc import Iterator
 

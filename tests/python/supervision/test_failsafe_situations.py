@@ -12,8 +12,8 @@ from mauve_rt.control.control import Control
 from mauve_rt.control.requests import OVER_RULES, Code, Request
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.decisions import Decision
+from mauve_rt.supervision.rehearsed_rules import RehearsedRules
 from mauve_rt.supervision.rules import RulesFile
-from mauve_rt.supervision.simulated_rules import SimulatedRules
 from mauve_rt.supervision.stand_ins import StandInRuntime
 
 MANUAL = "p/Manual"
@@ -30,7 +30,7 @@ class Vehicle:
         self._control = Control(self.runtime)
         self.ask(MANUAL)
         self.decisions: list[Decision] = []
-        self.rules = SimulatedRules(simulation, self.runtime, file, self.decisions.append)
+        self.rules = RehearsedRules(simulation, self.runtime, file, self.decisions.append)
 
     @property
     def mode(self) -> str:

@@ -12,7 +12,7 @@
 
 namespace mauve {
 
-/// An ordinary thread that waits for changes of the overlays. Whoever decides waits neither for the thread nor for the file.
+/// An ordinary thread that waits for changes of the overlays. The thread that decides waits neither for it nor for the file.
 ///
 /// | member     | written by         | read by    | order or lock                                              |
 /// | ---------- | ------------------ | ---------- | ---------------------------------------------------------- |

@@ -36,7 +36,7 @@ _SUPERVISOR = "supervisor"
 _LONGEST_BLIND_NS = 50_000_000  # what happens to components is noticed so much later at most
 
 
-class SimulatedRules:
+class RehearsedRules:
     """At work from the start on. The architecture is active."""
 
     def __init__(
@@ -95,7 +95,7 @@ class SimulatedRules:
             self._remote.hear(signal - self._inside, now_ns, value)
 
     def set_state(self, component: str, state: str) -> None:
-        """A component that is there runs from now on, or does not; a supervisor is told this state of it."""
+        """A component that is there runs from now on, or does not; a supervisor sees it in this state."""
         self._states[component] = state
         for part in self._runtime.components():
             runs = part.state == "RUNNING"
