@@ -262,7 +262,7 @@ bool RuleRunner::tell(std::size_t signal, time_ns_t time_ns, double value) {
   if (inputs_ != Inputs::told || !host_.is_simulated() || signal >= all.size()) {
     throw Error(ErrorCode::invalid_argument, "the rules cannot be told that",
                 {.element = "signal " + std::to_string(signal),
-                 .expected = "a signal of a runner with Inputs::told, in virtual time"});
+                 .expected = "a signal of rules that are told, in virtual time"});
   }
   const std::uint32_t word =
       engine_->word().load(std::memory_order_relaxed);  // relaxed: no other thread is at work
