@@ -23,7 +23,8 @@ def add_load(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         default="",
         metavar="FILE",
-        help="rules file, on the executor's computer (default: read the present file again)",
+        help="rules file, on the executor's computer, below its parameter rules_folder "
+        "(default: read the present file again)",
     )
     parser.add_argument(
         "--release",

@@ -25,7 +25,7 @@ from mauve_rt.node.executor.mirrors import Mirrors
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
-from mauve_rt.node.executor.settings import DEFAULTS, PARAMETERS
+from mauve_rt.node.executor.settings import DEFAULTS, PARAMETERS, rules_folder
 from mauve_rt.node.executor.state import StatePublisher
 from mauve_rt.node.executor.state_folder import StateFolder
 from mauve_rt.node.shared.service_thread import refused_reply
@@ -96,6 +96,7 @@ class ExecutorNode(LifecycleNode):
             event=self._state.event,
             follow=self._properties.follow,
             watch=self.watch,
+            folder=rules_folder(settings),
         )
         self._state.rules = self._rules.names
         self._folder = StateFolder(

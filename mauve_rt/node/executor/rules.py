@@ -58,10 +58,11 @@ class OwnRules:
         event: Callable[[Request, Outcome], None],
         follow: Callable[[], None],
         watch: Watch,
+        folder: Path,
     ) -> None:
         """`topics`: those that resources are bound to; `publish` sends and records a message.
 
-        `listen` takes the resources for whose silence rules listen.
+        `listen` takes the resources for whose silence rules listen. load() reads files below `folder` only.
 
         `event` tells of what was done; `follow` lets parameters follow it.
         """
@@ -73,6 +74,7 @@ class OwnRules:
         self._event = event
         self._follow = follow
         self._watch = watch
+        self._folder = folder.absolute()
         self._qos = QoSProfile(depth=KEPT_DECISIONS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._decisions = node.create_publisher(SupervisorDecision, "~/decisions", self._qos)
         self._lock = threading.RLock()
@@ -123,6 +125,7 @@ class OwnRules:
 
         Raises:
             ActiveSafetyRuleError: one is gone that is active, and not among these.
+            ParameterError: the file lies elsewhere; whether there is one is not looked at.
             MauveError: they cannot be used; the present ones go on.
         """
         with self._lock:
@@ -131,7 +134,7 @@ class OwnRules:
                 raise ParameterError("no rules were loaded yet: name a file")
             if self._runner is None:
                 self._rested = None  # the check of the new ones listens to the same components
-            loaded = self._load(Path(path) if path or before is None else before.path)
+            loaded = self._load(self._below(path) if path or before is None else before.path)
             self._check_release(loaded, release)
             if self._runner is not None or self._runtime.active:
                 self._end()
@@ -143,6 +146,13 @@ class OwnRules:
                     raise
             self._loaded, self._rested = loaded, None
             return len(loaded.rules)
+
+    def _below(self, path: str) -> Path:
+        file = self._folder / path
+        if self._folder.resolve() not in file.resolve().parents:
+            where = f"{self._folder} (the executor's parameter rules_folder)"
+            raise ParameterError(f"rules file '{path}': expected a file below {where}; copy it there")
+        return file
 
     def _load(self, path: Path) -> "LoadedRules":
         from mauve_rt.node.executor.rules_file import LoadedRules  # noqa: PLC0415

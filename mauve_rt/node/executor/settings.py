@@ -35,6 +35,10 @@ PARAMETERS: dict[str, Setting] = {
         0, "size at which a recording goes on in a new file, in bytes; 0: never", _CONFIGURED, minimum=0
     ),
     "rules": Setting("", "rules file; the executor runs its rules `in: executor`; empty: none", _CONFIGURED),
+    "rules_folder": Setting(
+        "",
+        "folder below which ~/load_rules reads files; empty: that of `rules`, or else of the architecture file",
+    ),
     "state_folder": Setting(
         "",
         "folder in which latched rules, quarantine and what persons changed outlast a restart; "
@@ -144,6 +148,12 @@ class Settings:
             usage = "ros2 run mauve_rt executor --ros-args -p architecture:=FILE"
             raise ParameterError(f"parameter 'architecture' is missing: {usage}")
         return load_architecture(Path(self.architecture), overrides=self.overrides)
+
+
+def rules_folder(values: Mapping[str, Any]) -> Path:
+    """The folder below which requests may name rules files."""
+    named = str(values["rules_folder"])
+    return Path(named) if named else Path(values["rules"] or values["architecture"]).parent
 
 
 def help_text() -> str:

@@ -409,6 +409,29 @@ def test_a_reply_shows_nothing_of_a_file_that_holds_no_rules(
     assert not any(word in reply.message for word in ("hunter2", "password", "machine", "KEY"))
 
 
+@pytest.mark.parametrize("is_there", [True, False])
+def test_a_request_names_rules_below_one_folder_only(
+    start: Start, graph: Any, files: tuple[Path, Path], tmp_path: Path, is_there: bool
+):
+    """Also by a link; and whether another file is there is not said."""
+    below = tmp_path / "below"
+    below.mkdir()
+    start("-p", f"rules_folder:={below}")
+    if is_there:
+        (tmp_path / "outside.yaml").write_text(RULES, encoding="utf-8")
+    (below / "link.yaml").symlink_to(tmp_path / "outside.yaml")
+    (below / "inside.yaml").write_text(RULES, encoding="utf-8")
+    for path in (tmp_path / "outside.yaml", "../outside.yaml", "link.yaml"):
+        reply = graph.ask(LoadRules, f"{NODE}/load_rules", path=str(path))
+        assert (reply.success, reply.code) == (False, Code.INVALID)
+        assert reply.message == (
+            f"rules file '{path}': expected a file below {below} (the executor's parameter rules_folder); "
+            "copy it there"
+        )
+    for path in ("inside.yaml", str(below / "inside.yaml")):
+        assert graph.ask(LoadRules, f"{NODE}/load_rules", path=path).success
+
+
 def test_rules_are_loaded_anew_whole_or_not_at_all(start: Start, graph: Any, files: tuple[Path, Path]):
     robot = start()
     robot.await_said("armed")
