@@ -48,6 +48,8 @@ def print_components(reply: Any, out: Console | None = None) -> None:
         out.print(f"[yellow]warning[/]: {escape(line)}", soft_wrap=True)
     for line in reply.realtime.missing:
         out.print(f"[yellow]no real time[/]: {escape(line)}", soft_wrap=True)
+    if reply.access:
+        out.print(f"may change it: {escape(reply.access)}", style="dim", soft_wrap=True)
     out.print(f"revision {reply.revision}", style="dim")
 
 

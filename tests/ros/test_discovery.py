@@ -144,6 +144,38 @@ def test_an_executor_is_bound_to_loopback_however_it_was_told_to_stay(
         _wait_until_logged("on this machine only: UDP bound to 127.0.0.1", process, log)
 
 
+@pytest.mark.parametrize("program", ["executor", "supervisor", "world"])
+@pytest.mark.parametrize("reach", ["LOCALHOST", "SUBNET"])
+def test_other_accounts_cannot_read_the_shared_memory_of_a_program(
+    program: str, reach: str, domain: int, tmp_path: Path
+) -> None:
+    """The messages lie in it."""
+    words = _words(program, tmp_path)
+    said = {"ROS_DOMAIN_ID": str(domain), RANGE: reach}
+    with _running(tmp_path, words, said) as (process, log):
+        _begin(process, log, domain)
+        mapped = Path(f"/proc/{process.pid}/maps").read_text("utf-8").split()
+        files = {Path(word) for word in mapped if word.startswith("/dev/shm/fastrtps_")}  # noqa: S108
+        assert any("port" in file.name for file in files)
+        wait_until(lambda: {file.stat().st_mode & 0o077 for file in files} == {0})
+
+
+@pytest.mark.parametrize(
+    ("reach", "others"),
+    [("LOCALHOST", ""), ("SUBNET", f", and every machine that reaches it ({RANGE}=SUBNET)")],
+)
+def test_list_says_who_may_change_an_executor(reach: str, others: str, domain: int, tmp_path: Path) -> None:
+    said = {"ROS_DOMAIN_ID": str(domain), RANGE: reach}
+    with _running(tmp_path, _words("executor", tmp_path), said) as (process, log):
+        _begin(process, log, domain)
+        call = [sys.executable, "-m", "mauve_rt.cli", "list", "/executor"]
+        environment = os.environ | said
+        shown = subprocess.run(
+            call, env=environment, cwd=tmp_path, capture_output=True, text=True, check=False
+        )
+        assert f"may change it: every account of this machine{others}\n" in shown.stdout, shown
+
+
 @pytest.mark.parametrize("program", PROGRAMS)
 @pytest.mark.parametrize("can_write", [True, False])
 def test_a_program_announces_itself_from_the_last_port_to_the_first(

@@ -93,6 +93,7 @@ def _with_ros(words: list[str], runtime: Any, settings: Any, start: RosStart, st
         with first_participant():
             node = ExecutorNode(runtime, namespace=namespace, settings=settings.values)
         discovery = reach(sockets)
+        node.access = discovery.access
         # Components in Python would wait for the interpreter while modules load: then these come first.
         waits_for_python = any(map(runtime.has_python_parts, runtime.components()))
         opens_late = settings.autostart and not waits_for_python

@@ -102,6 +102,7 @@ class ExecutorNode(LifecycleNode):
         self._folder = StateFolder(
             self, self._rules, folder=settings["state_folder"], forget=settings["forget"]
         )
+        self.access = ""  # who reaches its services; known once there is a participant
         self._node_watch: NodeWatch | None = None
         self._guard: StopGuard | None = None
 
@@ -144,6 +145,7 @@ class ExecutorNode(LifecycleNode):
             load_rules=self._load_rules,
             watch=self.watch,
             warnings=self._name_watch.warnings,
+            access=lambda: self.access,
             control_group=self.control_group,
             query_group=query_group,
         )

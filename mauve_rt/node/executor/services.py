@@ -83,11 +83,12 @@ class Services:
         rules: OwnRules,
         load_rules: Callable[[str, Sequence[str]], tuple[Code, str]],
         warnings: Callable[[], list[str]],
+        access: Callable[[], str],
         watch: Watch,
         control_group: CallbackGroup,
         query_group: CallbackGroup,
     ) -> None:
-        self._warnings = warnings
+        self._warnings, self._access = warnings, access
         self._runtime = runtime
         self._control = control
         self._bound = bound
@@ -188,6 +189,7 @@ class Services:
         response.components = component_infos(self._runtime)
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
+        response.access = self._access()
         response.warnings = self._warnings()
         response.held = held_elements(self._runtime)
         return response

@@ -37,7 +37,7 @@ PARAMETERS: dict[str, Setting] = {
     "rules": Setting("", "rules file; the executor runs its rules `in: executor`; empty: none", _CONFIGURED),
     "rules_folder": Setting(
         "",
-        "folder below which ~/load_rules reads files; empty: that of `rules`, or else of the architecture file",
+        "folder below which ~/load_rules reads files; empty: that of `rules`, or else of `architecture`",
     ),
     "state_folder": Setting(
         "",

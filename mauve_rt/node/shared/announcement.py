@@ -1,4 +1,4 @@
-"""The first announcement of a program that stays on this machine, so that no answer to it is lost.
+"""The first DDS participant of a program: it keeps its shared memory to itself, and gets every answer.
 
 A participant of Fast DDS announces itself to one port of 127.0.0.1 after another, and receives only then. An
 answer that comes before is lost, and the next announcement of the other participant comes up to 3 s later.
@@ -9,13 +9,14 @@ the first. The ports depend on the ROS domain: a file that exists while Fast DDS
 
 import os
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
 from mauve_rt.node.shared.discovery import PROFILES, has_own_profile
 from mauve_rt.node.shared.domain import domain
 from mauve_rt.node.shared.rtps_ports import discovery_ports
 
+_MEMORY = "/dev/shm/fastrtps_"  # noqa: S108 - Fast DDS's
 _PARTICIPANTS = 32  # as the profiles have it
 _PEERS = "<locator><udpv4><address>127.0.0.1</address></udpv4></locator>"
 _PEER = "<locator><udpv4><address>127.0.0.1</address><port>{}</port></udpv4></locator>"
@@ -25,8 +26,9 @@ _PEER = "<locator><udpv4><address>127.0.0.1</address><port>{}</port></udpv4></lo
 def first_participant() -> Iterator[None]:
     """Make the first DDS participant of this process inside of it; the environment is for children as before.
 
-    Where the program reaches further, or the user has a profile, this changes nothing. No other thread may
-    read the environment as it begins or ends.
+    Other accounts cannot read its files in /dev/shm: they hold the messages. Other accounts cannot use shared
+    memory anyway, which they would have to write. The announcement changes only where the program stays on
+    this machine by its own profile. No other thread may read the environment meanwhile.
     """
     with ExitStack() as stack:
         if has_own_profile():
@@ -35,6 +37,16 @@ def first_participant() -> Iterator[None]:
                 os.environ[PROFILES] = path
                 stack.callback(os.environ.__setitem__, PROFILES, own)
         yield
+    _close_memory()
+
+
+def _close_memory() -> None:
+    """Fast DDS gives its files mode 0644, whatever the umask is."""
+    with suppress(OSError):  # no /proc
+        mapped = Path("/proc/self/maps").read_text("utf-8").split()
+        for path in {word for word in mapped if word.startswith(_MEMORY)}:
+            with suppress(OSError):  # of another account, or gone
+                Path(path).chmod(0o600)
 
 
 def _downwards(profile: str, domain: int) -> str:

@@ -35,6 +35,7 @@ _FILE_HERE = Path("DEFAULT_FASTRTPS_PROFILES.xml")  # which Fast DDS reads from 
 _MIDDLEWARE, _FAST_DDS = "RMW_IMPLEMENTATION", "rmw_fastrtps"
 _SELF = Path("/proc/self")
 _IPV4_DIGITS = 8
+_SECURED = ("true", "Enforce")
 _WAITING = "a network interface that stands still can hold up every topic, also on this machine: {}"
 _UDP, _NON_BLOCKING = r"<type>\s*UDPv[46]\s*</type>", r"<non_blocking_send>\s*true\s*</non_blocking_send>"
 
@@ -44,9 +45,10 @@ class LoopbackError(Exception):
 
 
 class Reach(NamedTuple):
-    """How far a program reaches, as its sockets have it."""
+    """How far a program reaches, as its sockets have it, and who reaches it."""
 
     text: str
+    access: str
 
     def log(self, logger: Any) -> None:
         """Write it to the log of a node."""
@@ -175,7 +177,7 @@ def reach(before: dict[str, str]) -> Reach:
     addresses = sorted({now[inode] for inode in now.keys() - before.keys()})
     bound = f"UDP bound to {', '.join(addresses) or 'no address'}"
     if addresses and all(address.startswith("127.") for address in addresses):
-        return Reach(f"on this machine only: {bound}; {RANGE}=SUBNET lets other machines in")
+        return Reach(f"on this machine only: {bound}; {RANGE}=SUBNET lets other machines in", _access(""))
     if has_own_profile() and addresses:
         raise LoopbackError(
             f"{bound} in spite of {PROFILES}={os.environ[PROFILES]}; is this file readable XML?"
@@ -183,7 +185,7 @@ def reach(before: dict[str, str]) -> Reach:
     opened = opened_by()
     if opened:
         text = f"discovery beyond this machine ({opened}): without DDS Security anyone there can reconfigure"
-        return Reach(f"{text}; {bound}")
+        return Reach(f"{text}; {bound}", _access(opened))
     profile = users_profile()
     if profile and addresses:
         raise LoopbackError(
@@ -191,7 +193,14 @@ def reach(before: dict[str, str]) -> Reach:
             f"other machines could reconfigure. Set {RANGE}=SUBNET to let them in, unset the profile, or "
             f"set {RANGE}=SYSTEM_DEFAULT and give it the transports of share/mauve_rt/dds/local.xml."
         )
-    return Reach(f"discovery stays on this machine; {bound}")
+    return Reach(f"discovery stays on this machine; {bound}", _access(""))
+
+
+def _access(opened: str) -> str:
+    if (os.environ.get("ROS_SECURITY_ENABLE"), os.environ.get("ROS_SECURITY_STRATEGY")) == _SECURED:
+        return "who has a certificate and permissions of its DDS Security"
+    others = f", and every machine that reaches it ({opened})" if opened else ""
+    return f"every account of this machine{others}"
 
 
 def _target(link: Path) -> str:

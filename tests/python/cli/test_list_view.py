@@ -44,7 +44,8 @@ def test_what_runs_on_which_cpu_at_which_priority_and_its_cores() -> None:
         policy="SCHED_OTHER",
         fault="range_error: [off] the map",
     )
-    lines = _printed(ListComponents.Response(components=[running, protected], revision=5))
+    access = "every account of this machine"
+    lines = _printed(ListComponents.Response(components=[running, protected], access=access, revision=5))
     assert _line(lines, "guidance") == ["guidance", "RUNNING", "100", "ms", "60", "0,1", "7", "2"]
     assert _line(lines, "robot") == ["robot", "FAULTED", "-", "-", "any", "0", "0"]
     cores = [line.split() for line in lines if "p/" in line]
@@ -55,7 +56,7 @@ def test_what_runs_on_which_cpu_at_which_priority_and_its_cores() -> None:
     ]
     assert cores[0][3] in ("1970-01-01", "1970-01-02"), "of another day the date"
     assert "(protected)" in "".join(lines)
-    assert lines[-2:] == ["robot: range_error: [off] the map", "revision 5"]
+    assert lines[-3:] == ["robot: range_error: [off] the map", f"may change it: {access}", "revision 5"]
 
 
 def test_each_port_says_what_it_is_connected_to_and_where_that_goes() -> None:

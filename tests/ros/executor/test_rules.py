@@ -411,7 +411,7 @@ def test_a_reply_shows_nothing_of_a_file_that_holds_no_rules(
 
 @pytest.mark.parametrize("is_there", [True, False])
 def test_a_request_names_rules_below_one_folder_only(
-    start: Start, graph: Any, files: tuple[Path, Path], tmp_path: Path, is_there: bool
+    start: Start, graph: Any, tmp_path: Path, *, is_there: bool
 ):
     """Also by a link; and whether another file is there is not said."""
     below = tmp_path / "below"
