@@ -3,7 +3,6 @@
 import argparse
 import json
 import math
-import os
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
 from mauve_rt.counts import counted
+from mauve_rt.unfinished import beside
 
 if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Subject
@@ -230,7 +230,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
                 raise ArchitectureFileError(path, [problem]) from error
             count += 1
     whole = path.resolve()
-    unfinished = whole.with_name(f".{whole.name}.{os.getpid()}")
+    unfinished = beside(whole)
     try:
         unfinished.write_bytes(text.encode())
         unfinished.chmod(whole.stat().st_mode)

@@ -18,6 +18,7 @@ from typing import Any
 
 from mauve_rt.cli.rtps_ports import discovery_sockets
 from mauve_rt.node.shared.domain import DOMAIN, domain_problem
+from mauve_rt.unfinished import beside
 
 _FORMAT = 1
 _MAX_BYTES = 1 << 20
@@ -140,7 +141,7 @@ class Cache:
             "executors": [asdict(executor) for executor in graph.executors.values()],
         }
         data = json.dumps(content).encode()
-        new = self.file.with_suffix(f".{os.getpid()}")
+        new = beside(self.file)
         if len(data) > _MAX_BYTES:
             return
         with contextlib.suppress(OSError):

@@ -1,5 +1,6 @@
 """Progress of long work on a terminal: a bar on standard error that is gone at the end. Nothing elsewhere."""
 
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
@@ -8,13 +9,14 @@ from rich.markup import escape
 from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 
+from mauve_rt.cli.plain_output import beneath, plain
 from mauve_rt.trace.progress import Progress, silent
 
 
 @contextmanager
 def shown() -> Iterator[Progress]:
     """What to call with the progress."""
-    console = Console(stderr=True)
+    console = Console(file=beneath(sys.stderr))
     if not console.is_terminal:
         yield silent
         return
@@ -23,6 +25,6 @@ def shown() -> Iterator[Progress]:
         task = bar.add_task("", total=1.0)
 
         def show(done: float, what: str) -> None:
-            bar.update(task, completed=done, description=escape(what))
+            bar.update(task, completed=done, description=escape(plain(what)))
 
         yield show

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from mauve_rt.cli.pipe import PIPE_CLOSED, piped
+from mauve_rt.cli.plain_output import plain_output
 from mauve_rt.errors import MauveError, one_line
 from mauve_rt.node.shared.failures import report_failure
 from mauve_rt.trace.errors import TraceError
@@ -33,7 +34,8 @@ class Verb:
 
 def run(verb: Verb, args: argparse.Namespace) -> int:
     """Run a verb, under `mauve` or `ros2 mauve`; returns the exit status, errors are told on stderr."""
-    return piped(lambda: _run(verb, args))
+    with plain_output():
+        return piped(lambda: _run(verb, args))
 
 
 def _run(verb: Verb, args: argparse.Namespace) -> int:

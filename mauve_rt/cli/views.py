@@ -6,10 +6,12 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from mauve_rt.cli.plain_output import beneath, plain
 from mauve_rt.cli.verb import OK, REFUSED
 
 if TYPE_CHECKING:  # rich takes its time to load, and JSON or a line of text have no use for it
     from rich.console import Console
+    from rich.text import Text
 
 _WIDE = 160
 _WORTH_TELLING_NS = 1_000  # some steps prepare nothing
@@ -30,7 +32,8 @@ def as_plain(message: Any) -> Any:
 
 def print_json(value: Any) -> None:
     """Indented JSON on stdout."""
-    print(json.dumps(as_plain(value), indent=2, ensure_ascii=False))
+    text = json.dumps(as_plain(value), indent=2, ensure_ascii=False)
+    print(text if plain(text) == text else json.dumps(as_plain(value), indent=2))
 
 
 def console() -> "Console":
@@ -38,11 +41,15 @@ def console() -> "Console":
     from rich.console import Console  # noqa: PLC0415
 
     class OurConsole(Console):
+        def render_str(self, text: str, **how: Any) -> "Text":
+            """Also of the cells of tables."""
+            return super().render_str(plain(text), **how)
+
         def on_broken_pipe(self) -> None:
             """As of any other output: see `pipe`."""
             raise BrokenPipeError
 
-    return OurConsole(highlight=False, width=None if sys.stdout.isatty() else _WIDE)
+    return OurConsole(file=beneath(sys.stdout), highlight=False, width=None if sys.stdout.isatty() else _WIDE)
 
 
 def print_reply(reply: Any, *, as_json: bool, lines: Sequence[str] = ()) -> int:

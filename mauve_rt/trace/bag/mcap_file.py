@@ -54,6 +54,7 @@ class McapFile:
         self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start))
         self._before = self._now
         self._descriptor = -1
+        self._is_lost = False
         self._disk = disk or Disk()
         unfinished = path.with_name(f".{path.name}.new")
         try:
@@ -77,8 +78,8 @@ class McapFile:
 
     @property
     def flushed(self) -> Counts:
-        """What the file on disk holds now."""
-        return self._now.counts
+        """What the file on disk holds now; nothing once it is lost."""
+        return Counts() if self._is_lost else self._now.counts
 
     @property
     def is_waiting(self) -> bool:
@@ -124,9 +125,13 @@ class McapFile:
 
         Raises:
             TraceError: the system refused, e.g. the disk is full. What was flushed before is still there
-            and complete.
+            and complete. Or the file is no longer in its place: all of it is lost.
 
         """
+        self._write_what_waits()
+        self._check_place()
+
+    def _write_what_waits(self) -> None:
         chunk, before = self._written, self._before = self._chunk, self._now
         if not self.is_waiting:
             return
@@ -144,6 +149,19 @@ class McapFile:
             msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
             raise TraceError(msg) from error
         self._chunk = PendingChunk()
+
+    def _check_place(self) -> None:
+        """The system lets a file be written that has no name any longer."""
+        try:
+            self._is_lost = not os.path.samestat(self.path.stat(), os.fstat(self._descriptor))
+        except FileNotFoundError:
+            self._is_lost = True
+        except OSError:  # not known
+            return
+        if self._is_lost:
+            lost = counted(self._now.counts.messages, "message")
+            msg = f"bag file {self.path}: deleted or replaced while it was recorded; {lost} of it lost"
+            raise TraceError(msg)
 
     def undo_flush(self) -> str:
         """Make the file what it was before the last flush, or attempt at one; says what came of it.

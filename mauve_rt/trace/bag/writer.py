@@ -1,6 +1,5 @@
 """A rosbag2 directory around MCAP files: metadata.yaml, message definitions, topics."""
 
-import os
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +21,7 @@ from mauve_rt.trace.bag.metadata import (
 from mauve_rt.trace.bag.recorded import TopicQos
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
+from mauve_rt.unfinished import beside
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class BagWriter:
 
     def _create(self) -> None:
         """Made beside and renamed into place: nobody ever sees a bag folder without a finished bag in it."""
-        unfinished = self.directory.with_name(f".{self.directory.name}.{os.getpid()}")
+        unfinished = beside(self.directory)
         try:
             exists = self.directory.exists()
             if not exists:

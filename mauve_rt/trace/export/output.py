@@ -1,12 +1,12 @@
 """Files made beside and renamed into place: whoever looks sees all of one, or nothing."""
 
-import os
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.unfinished import beside
 
 
 @contextmanager
@@ -48,7 +48,7 @@ def _unfinished(path: Path, *, force: bool, folder: bool) -> Iterator[Path]:
         whole = path.resolve()  # "." has no name
         if path.exists():
             _check_replaceable(path, force=force, folder=folder)
-        place = whole.with_name(f".{whole.name}.{os.getpid()}")
+        place = beside(whole)
         try:
             yield place
         finally:

@@ -182,6 +182,14 @@ def test_an_existing_folder_is_refused(tmp_path: Path):
     assert list((tmp_path / "bag").iterdir()) == []
 
 
+def test_what_a_kill_left_beside_blocks_no_bag(tmp_path: Path):
+    """Also of a process with the same number: every container has a process 1."""
+    (tmp_path / f".bag.{os.getpid()}").mkdir()
+    with BagWriter(tmp_path / "bag") as bag:
+        write(bag, range(3))
+    assert len(read(tmp_path / "bag")) == 3
+
+
 def test_a_folder_that_cannot_be_made_is_refused(tmp_path: Path):
     (tmp_path / "file").write_text("")
     with pytest.raises(TraceError, match="cannot be created"):

@@ -167,6 +167,26 @@ def test_a_full_disk_ends_the_recording_and_says_so_once(
     assert len(open_trace(recorder.directory).records["control"]) >= 2
 
 
+@pytest.mark.parametrize("is_replaced", [False, True])
+def test_a_file_that_was_deleted_ends_the_recording_and_is_not_counted(
+    recorder: Recorder, source: SyntheticSource, errors: list[str], *, is_replaced: bool
+):
+    """The system goes on taking what is written to it, which nothing will ever show."""
+    recorder.start()
+    source.cycle("control", 1000, states={}, wait_ns=20)
+    wait_until(lambda: records_in(recorder.directory, "control") == 2)
+    [file] = recorder.directory.glob("*.mcap")
+    file.unlink()
+    if is_replaced:
+        file.touch()
+    source.cycle("control", 2000, states={}, wait_ns=20)
+    wait_until(lambda: not recorder.recording)
+    recorder.stop()
+    [error] = errors
+    assert f"recording stopped: bag file {file}: deleted or replaced while it was recorded" in error
+    assert recorder.message_count == 0
+
+
 def test_a_fault_of_the_source_ends_the_recording_only(
     recorder: Recorder, source: SyntheticSource, errors: list[str], monkeypatch: pytest.MonkeyPatch
 ):

@@ -21,7 +21,7 @@
 namespace mauve {
 
 /// In place of a figure that was not measured; as mauve_msgs/msg/StepReport.NOT_MEASURED.
-inline constexpr std::int64_t kNotMeasured = -INT64_MAX;
+inline constexpr std::int64_t kNotMeasured = -1;
 
 /// What one step of a reconfiguration cost; fields as mauve_msgs/msg/StepReport.
 struct StepReport {
