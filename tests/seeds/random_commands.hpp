@@ -290,6 +290,10 @@ class RandomCommands {
     Dice dice(seed_ + 5);
     for (int changes = 2 + dice.below(6); changes > 0 && !is_shut_down_; --changes) {
       pause(dice);
+      if (!has_epochs_ && dice.once_in(3)) {  // also while a change that replaces the core is decided
+        revert(static_cast<std::size_t>(dice.below(2)), dice);
+        continue;
+      }
       if (has_epochs_ || dice.once_in(3)) {
         attempt("publish", ms_to_ns(200), [&] { architecture_->publish("written"); });
         continue;
