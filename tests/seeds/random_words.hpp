@@ -100,8 +100,8 @@ class RandomWords {
     meet(tell, [&] {
       const rules::Signal::Last last = signal.last();
       findings_.count("reports read");
-      findings_.expect(last.count >= before, "report " + std::to_string(last.count) + " is read after report " +
-                                                 std::to_string(before));
+      findings_.expect(last.count >= before, "report " + std::to_string(last.count) +
+                                                 " is read after report " + std::to_string(before));
       findings_.expect(
           static_cast<double>(last.count) == last.value && static_cast<double>(last.time_ns) == last.value,
           "report " + std::to_string(last.count) + " is torn");
@@ -120,7 +120,8 @@ class RandomWords {
         const std::uint32_t seen = word->value.load(std::memory_order_acquire);
         const rules::Signal::Last last = signal.last();
         is_high = last.value > kThreshold;
-        const bool is_quiet = is_high ? signal.listen(kThreshold + 1, 1e9, last) : signal.listen(-1e9, kThreshold, last);
+        const bool is_quiet =
+            is_high ? signal.listen(kThreshold + 1, 1e9, last) : signal.listen(-1e9, kThreshold, last);
         if (is_quiet) futex_wait_until(word->value, seen, kForever);
       }
     });
@@ -150,7 +151,9 @@ class RandomWords {
       for (bool& object : is_revoked) {
         reference.set(object);
         seeds::compute(dice_.between(0, us_to_ns(3)));
-        findings_.expect(reference.revoke(object, kForever), "a revoked object is in use");
+        const bool is_unused =
+            dice_.once_in(2) ? reference.revoke(kForever) : reference.revoke(object, kForever);
+        findings_.expect(is_unused, "a revoked object is in use");
         object = true;
         ++next;
       }
@@ -177,10 +180,10 @@ class RandomWords {
     architecture.configure();
     Deployer deployer(architecture);
     deployer.deploy();
-    const rules::When above{.kind = "value",
-                            .parameters = {{"resource", std::string("beat")},
-                                           {"field", std::string("value")},
-                                           {"above", kThreshold}}};
+    const rules::When above{
+        .kind = "value",
+        .parameters = {
+            {"resource", std::string("beat")}, {"field", std::string("value")}, {"above", kThreshold}}};
     // It holds for longer than the scenario lasts: the rule does nothing.
     const rules::Rule rule{.name = "rule", .when = above, .for_ns = s_to_ns(1000), .about = {"c"}};
     rules::RuleActions actions;

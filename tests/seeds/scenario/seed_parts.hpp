@@ -298,7 +298,7 @@ class SeedCore : public Core<TestShell> {
   Dice dice_;
   std::int64_t count_{0};   // take() moves it over
   std::int64_t copied_{0};  // the kernel copies it
-  int adopted_{kNone};       // the core whose successor it is to be
+  int adopted_{kNone};      // the core whose successor it is to be
   bool is_ready_{false};
   bool has_refused_{false};
   bool is_on_probation_{false};
