@@ -430,11 +430,11 @@ bool RuleRunner::is_unsettled(std::size_t index) const noexcept {
 }
 
 void RuleRunner::show_status() noexcept {
-  const bool is_locked = status_mutex_.try_lock();
+  ++shown_;
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     Rule& rule = *rules_[i];
     const RuleStatus status = engine_->status(i);
-    if (is_locked) rule.status = status;
+    rule.status.store(status, 0, shown_);
     // relaxed: the thread that reads them is asked after it
     const bool is_other =
         rule.in_effect.exchange(status.in_effect, std::memory_order_relaxed) != status.in_effect;
@@ -443,7 +443,6 @@ void RuleRunner::show_status() noexcept {
     if (std::exchange(rule.has_ended, false) || is_other || (may_prepare && !could_prepare))
       rule.prepares.ask();
   }
-  if (is_locked) status_mutex_.unlock();
 }
 
 // ---- the commit thread and the reserve thread of a rule
@@ -719,14 +718,14 @@ std::uint64_t RuleRunner::lost() const {
   return engine_->lost() + left_out_;
 }
 
-/// The first of what keeps the rule from acting; both mutexes are held.
-std::string RuleRunner::problem_of(const Rule& rule) const {
+/// The first of what keeps the rule from acting.
+std::string RuleRunner::problem_of(const Rule& rule, const RuleStatus& status) const {
   if (!unobservable_.empty()) return unobservable_;
   if (!rule.hindrance.empty()) return rule.hindrance;
   if (!rule.kept.problem.empty()) return rule.kept.problem;
-  if (rule.status.failed) {
-    const std::string why = rule.failure.empty() ? std::string(words_of(rule.status.why)) : rule.failure;
-    return std::string(name_of(*rule.status.failed)) + " failed: " + why;
+  if (status.failed) {
+    const std::string why = rule.failure.empty() ? std::string(words_of(status.why)) : rule.failure;
+    return std::string(name_of(*status.failed)) + " failed: " + why;
   }
   const time_ns_t since_ns = rule.preparing_since_ns.load(std::memory_order_relaxed);
   if (since_ns != 0 && clock_.now_ns() - since_ns > kPreparing) return "its action is still being prepared";
@@ -736,14 +735,14 @@ std::string RuleRunner::problem_of(const Rule& rule) const {
 std::vector<RuleFacts> RuleRunner::facts() const {
   std::vector<RuleFacts> all;
   const LockGuard told(told_mutex_);
-  const LockGuard status(status_mutex_);
   for (std::size_t i = 0; i < rules_.size(); ++i) {
     Rule& rule = *rules_[i];
-    const Act next = rule.status.in_effect ? Act::undo : Act::do_;
+    const RuleStatus status = rule.shown_status();
+    const Act next = status.in_effect ? Act::undo : Act::do_;
     all.push_back({.name = engine_->rule(i).name,
-                   .status = rule.status,
+                   .status = status,
                    .ready = rule.kept.has_no_steps[index_of(next)] || (rule.overlay && is_ready(i, next)),
-                   .problem = problem_of(rule),
+                   .problem = problem_of(rule, status),
                    .memory_bytes = rule.kept.memory_bytes});
   }
   return all;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Rules at work beside components, on threads and in virtual time.
+#include <atomic>
 #include <random>
+#include <thread>
 
 #include "mauve_rt/rules/rule_runner.hpp"
 
@@ -624,6 +626,28 @@ TYPED_TEST(RuleRunnerTest, FromAHigherRulesEndItGoesStraightToTheLowerOnesWant) 
   EXPECT_EQ("t/Counting", undone.action.report->steps.at(0).to_core);
   this->beat.write.write({.value = 1.0}, 1);
   this->until_there("t/Core");
+}
+
+TYPED_TEST(RuleRunnerTest, TheFactsAreShownAlsoWhereTheyAreAskedForAllTheTime) {
+  this->add_rule(too_high(3.0));
+  this->rules.back().for_ns = s_to_ns(1000);  // it does nothing
+  this->deploy();
+  this->begin();
+  std::atomic<bool> is_over{false};
+  std::thread other([&] {
+    while (!TestFixture::is_virtual && !is_over) this->runner->facts();
+  });
+  for (int i = 0; i < 300 && !this->HasFatalFailure(); ++i) {
+    const bool is_high = i % 2 == 0;
+    this->beat.write.write({.value = is_high ? 4.0 : 1.0}, 1);
+    const auto is_shown = [&] {
+      this->take();
+      return this->runner->facts()[0].status.truth == truth_of(is_high);
+    };
+    this->way.until(is_shown, "the truth of the condition");
+  }
+  is_over = true;
+  other.join();
 }
 
 TYPED_TEST(RuleRunnerTest, ARuleWithoutUndoLeavesNothingThatWasNotInForce) {

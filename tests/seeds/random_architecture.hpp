@@ -242,7 +242,7 @@ class RandomArchitecture : private Changes {
         findings_.note(std::string("overtaken: ") + error.what());
       }
     });
-    sleep_for(dice_.between(0, ms_to_ns(2)));
+    sleep_for(dice_.between(0, dice_.once_in(2) ? us_to_ns(200) : ms_to_ns(2)));
     const time_ns_t began_ns = seeds::now_ns();
     const time_ns_t excused_ns = excuses_ns();
     shut_down("shutdown during a change");

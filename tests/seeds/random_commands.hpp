@@ -186,7 +186,7 @@ class RandomCommands {
       deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = ms_to_ns(20), .phase_ns = 0}});
     });
     if (!is_done) return;
-    if (dice.once_in(by_change ? 2 : 3)) return stop_at_once(component);
+    if (dice.once_in(by_change ? 2 : 3)) return stop_at_once(component, before);
     if (dice.once_in(2) || shared_->has_hangs) return;
     const time_ns_t until_ns = seeds::now_ns() + kPrompt;
     while (known.executions == before && !is_shut_down_ && !is_faulted(component) &&
@@ -197,7 +197,7 @@ class RandomCommands {
   }
 
   /// Of one that was started: its thread may not know of that yet.
-  void stop_at_once(std::size_t component) {
+  void stop_at_once(std::size_t component, int executions) {
     const time_ns_t stalled_ns = seeds::outcome().stalled_ns;
     bool was_faulted = false;  // it may be repaired by now, or be STOPPED while it is
     const bool is_done = attempt("stop at once " + name(component), kStop, [&] {
@@ -205,8 +205,9 @@ class RandomCommands {
         deployer_->stop(name(component), {.timeout_ns = kStop});
       } catch (const Error& error) {
         const std::string words = error.what();
+        const bool has_executed = shared_->components[component].executions != executions;
         was_faulted = words.find("found FAULTED") != std::string::npos ||
-                      words.find("found STOPPED") != std::string::npos;
+                      (has_executed && words.find("found STOPPED") != std::string::npos);
         throw;
       }
     });
@@ -255,9 +256,16 @@ class RandomCommands {
     if (transaction.steps().empty()) return;
     const time_ns_t patience_ns = dice.once_in(3) ? dice.between(0, us_to_ns(900)) : ms_to_ns(20);
     const time_ns_t began_ns = seeds::now_ns();
+    const bool is_prepared = !is_plain_ && !resynchronises && dice.once_in(3);
+    const TransactionOptions options{.timeouts = {.commit_ns = patience_ns, .phase_ns = 0}};
     attempt(text + (resynchronises ? " and epoch" : ""), patience_ns, [&] {
-      const TransactionReport report =
-          deployer_->commit(std::move(transaction), {.timeouts = {.commit_ns = patience_ns, .phase_ns = 0}});
+      if (is_prepared) {
+        const auto prepared = deployer_->prepare(std::move(transaction), options);
+        prepared->commit(patience_ns);
+        prepared->complete();
+        return;
+      }
+      const TransactionReport report = deployer_->commit(std::move(transaction), options);
       if (resynchronises)
         shared_->epochs.push_back({.epoch_ns = deployer_->epoch_ns(),
                                    .instant_ns = report.instant_ns,
@@ -290,6 +298,14 @@ class RandomCommands {
     Dice dice(seed_ + 5);
     for (int changes = 2 + dice.below(6); changes > 0 && !is_shut_down_; --changes) {
       pause(dice);
+      if (!has_epochs_ && dice.once_in(3)) {  // also while a change that replaces the core is decided
+        revert(static_cast<std::size_t>(dice.below(2)), dice);
+        continue;
+      }
+      if (dice.once_in(4)) {
+        attempt("settle", 0, [&] { deployer_->settle_probations(); });
+        continue;
+      }
       if (has_epochs_ || dice.once_in(3)) {
         attempt("publish", ms_to_ns(200), [&] { architecture_->publish("written"); });
         continue;

@@ -276,15 +276,26 @@ time_ns_t Machine::earliest_excess_ns() const noexcept {
   return ExecutionWord::end_ns(fact->since_ns, bound);
 }
 
+/// Of the present wait; at the start and in a wait for a time the shortest one of the fsm. 0: it waits for no event.
+time_ns_t Machine::timeout_ns() const noexcept {
+  const State* const wait = present_wait();
+  if (wait != nullptr && wait->event != nullptr) return wait->duration_ns;
+  time_ns_t shortest = 0;
+  for (const auto& state : fsm_->states()) {
+    if (state->event != nullptr && (shortest == 0 || state->duration_ns < shortest))
+      shortest = state->duration_ns;
+  }
+  return shortest;
+}
+
 std::int64_t Machine::skip_lost(time_ns_t since_ns, time_ns_t now_ns) noexcept {
   take_event();  // one that came meanwhile came before the timeout, or in its place
-  const State* const wait = present_wait();
-  const bool is_for_event = wait != nullptr && wait->event != nullptr;
-  const time_ns_t period = is_for_event ? wait->duration_ns : grid().period_ns;
+  const bool is_sporadic = grid().period_ns == 0;
+  const time_ns_t period = is_sporadic ? timeout_ns() : grid().period_ns;
   const time_ns_t due = due_ns();
   const time_ns_t late = now_ns - due;
   if (period == 0 || late < period || since_ns - due >= period) return 0;
-  if (is_for_event) {
+  if (is_sporadic) {
     set_clock_ns(now_ns);  // no grid to keep, as after an overrun
     event_settled_ = true;
     return late / period;

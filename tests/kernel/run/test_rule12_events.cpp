@@ -274,12 +274,13 @@ class Rule12Threads : public Deployed {
     architecture.connect("c", "input", "x", "read");
     return component;
   }
-  /// Deploys a listener with this timeout, and puts in a core whose adopt does this.
-  Component& change_in_adopt(time_ns_t timeout_ns, std::function<bool()> adopt) {
-    Component& component = add_free(architecture, "c", sporadic(timeout_ns, 0, us_to_ns(1)), {.cpus = {0}});
+  /// Deploys a listener with this timeout, and puts in a core whose adopt does this: after its first release, or with an offset before it.
+  Component& change_in_adopt(time_ns_t timeout_ns, std::function<bool()> adopt, time_ns_t offset_ns = 0) {
+    Component& component = add_free(architecture, "c", sporadic(timeout_ns, 0, us_to_ns(1)),
+                                    {.cpus = {0}, .offset_ns = offset_ns});
     architecture.connect("c", "input", "x", "read");
     deploy();
-    wait_runs(component, 1);
+    if (offset_ns == 0) wait_runs(component, 1);
     auto fresh = std::make_unique<AdoptingCore>(std::move(adopt));
     fresh->instants.reserve(100);
     Transaction change;
@@ -343,6 +344,23 @@ TEST_P(Rule12Adopt, TimeoutsThatPassInItAreMissedAndAreNoOverruns) {
   if (GetParam()) {
     EXPECT_GE(report.missed_releases, 2);
   }
+}
+
+TEST_P(Rule12Adopt, AStartThatPassesInItIsMissed) {
+  constexpr time_ns_t kOffset = ms_to_ns(300);
+  time_ns_t end_ns = 0;
+  const auto adopt = [&, agrees = GetParam()] {
+    sleep_for(deployer.epoch_ns() + kOffset + ms_to_ns(150) - monotonic_now_ns());
+    end_ns = monotonic_now_ns();
+    return agrees;
+  };
+  Component& component = change_in_adopt(ms_to_ns(40), adopt, kOffset);
+  wait_runs(component, 2);
+  deployer.shutdown();
+  const auto& instants = core(component).instants;
+  EXPECT_GE(instants[0], end_ns) << "150 ms late, longer than the timeout";
+  EXPECT_EQ(ms_to_ns(40), instants[1] - instants[0]);
+  EXPECT_EQ(0U, component.task().statistics().overruns);
 }
 
 TEST_F(Rule12Threads, NoWriteOfAnOrdinaryThreadIsLost) {

@@ -410,9 +410,16 @@ class Changes : protected Checks {
         continue;
       const bool has_hung = hung->second.is_in_state && hung->second.from_ns < draft.began_ns &&
                             hung->second.until_ns == kForever;
-      expect(!has_hung || state_of(i) != ComponentState::running,
+      expect(!has_hung || state_of(i) != ComponentState::running || was_reverted(draft.before[i].core),
              outcome + ": " + parts_[i].name + " hangs, and was not given up");
     }
+  }
+
+  /// A core that hung on probation: the old core goes on in its component.
+  bool was_reverted(int core) const {
+    return std::ranges::any_of(deployer_->probations(), [core](const ProbationRecord& record) {
+      return core_of(record.to_core) == core && record.verdict == ProbationVerdict::reverted;
+    });
   }
 
   void note_component(const Draft& draft, std::size_t index) {

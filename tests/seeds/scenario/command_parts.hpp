@@ -78,7 +78,15 @@ class CommandCore : public Core<TestShell> {
     --shared_->cores;
     is_ready_ = false;
   }
-  bool adopt(const CoreBase& /*old*/) override { return true; }
+  bool adopt(const CoreBase& old) override {
+    adopted_ = static_cast<const CommandCore&>(old).number_;
+    return true;
+  }
+  void take(CoreBase& old) noexcept override {
+    const int before = static_cast<CommandCore&>(old).number_;
+    expect(before == adopted_, "takes over from core " + std::to_string(before) + ", and has adopted core " +
+                                   std::to_string(adopted_));
+  }
   std::string description() const override { return "core " + std::to_string(number_); }
 
  private:
@@ -90,6 +98,7 @@ class CommandCore : public Core<TestShell> {
   std::shared_ptr<CommandShared> shared_;
   std::size_t component_;
   int number_;
+  int adopted_{0};  // the core whose successor it is to be
   Dice dice_;
   bool is_ready_{false};
 };

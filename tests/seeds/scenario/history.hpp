@@ -61,7 +61,11 @@ class History {
   }
   void note_sporadic(int component) { sporadic_.insert(component); }
   void note_verdict(int core, ProbationVerdict verdict) {
-    verdicts_.try_emplace(core, Verdict{.verdict = verdict, .seen_ns = seeds::now_ns()});
+    const auto [first, is_new] =
+        verdicts_.try_emplace(core, Verdict{.verdict = verdict, .seen_ns = seeds::now_ns()});
+    findings_.expect(first->second.verdict == verdict, "core " + std::to_string(core) + " has the verdict " +
+                                                           to_string(verdict) + ", and had the verdict " +
+                                                           to_string(first->second.verdict));
   }
 
   /// Before T the old parts, from T on the new ones; each release on the grid and none twice; no state is lost or taken twice.

@@ -171,7 +171,8 @@ class SeedCore : public Core<TestShell> {
     is_ready_ = false;
     behave(Hook::cleanup);
   }
-  bool adopt(const CoreBase& /*old*/) override {
+  bool adopt(const CoreBase& old) override {
+    adopted_ = static_cast<const SeedCore&>(old).number_;
     expect(is_ready_, "adopts and is not configured");
     const VisitNote note(*this);
     compute(us_to_ns(20));
@@ -183,6 +184,8 @@ class SeedCore : public Core<TestShell> {
     auto& before = static_cast<SeedCore&>(old);
     expect(before.component_ == component_, "takes the state of a core of another component");
     expect(!shared_->took_from.contains(number_), "takes over twice");
+    expect(before.number_ == adopted_, "takes over from core " + std::to_string(before.number_) +
+                                           ", and has adopted core " + std::to_string(adopted_));
     count_ = before.count_;
     shared_->took_from[number_] = before.number_;
     before.is_out_ = true;
@@ -295,6 +298,7 @@ class SeedCore : public Core<TestShell> {
   Dice dice_;
   std::int64_t count_{0};   // take() moves it over
   std::int64_t copied_{0};  // the kernel copies it
+  int adopted_{kNone};      // the core whose successor it is to be
   bool is_ready_{false};
   bool has_refused_{false};
   bool is_on_probation_{false};

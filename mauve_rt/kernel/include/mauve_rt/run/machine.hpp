@@ -160,7 +160,8 @@ class Machine {
   time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
   /// Instants that passed since then are skipped whatever the overrun policy; returns how many. One that has passed by less
   /// than a period is released late, as after any wait. One that was over a period late by then is the component's own overrun.
-  /// In a wait for an event an event that has come ends the wait; the timeout counts as the period, and the wait ends now. [rt]
+  /// In a wait for an event an event that has come ends the wait. Of a sporadic component the timeout counts as the period, and
+  /// its wait, or its wait for the start, ends now. [rt]
   std::int64_t skip_lost(time_ns_t since_ns, time_ns_t now_ns) MAUVE_RT;
   /// Executes at no clock before this one any more: T of a change that it has taken. [rt]
   void change_at(time_ns_t instant_ns) MAUVE_RT;
@@ -218,6 +219,7 @@ class Machine {
   const State* successor(const State& state) const;
   void enter_wait(const State& state);
   void handle_overrun(const State& state, time_ns_t now_ns);
+  time_ns_t timeout_ns() const MAUVE_RT;
   void tell_late_wakeup(time_ns_t now_ns) MAUVE_RT;
   void tell_late_response() MAUVE_RT;
   void set_clock_ns(time_ns_t instant) noexcept {

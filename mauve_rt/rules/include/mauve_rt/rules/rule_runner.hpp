@@ -13,6 +13,7 @@
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/condition_variable.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
+#include "mauve_rt/base/sequence_cell.hpp"
 #include "mauve_rt/deploy/host.hpp"
 #include "mauve_rt/rules/action.hpp"
 #include "mauve_rt/rules/engine.hpp"
@@ -76,7 +77,7 @@ struct RuleFacts {
 /// | Rule::found       | follower        | decision thread | release/acquire: what was found lies in it                  |
 /// | Rule::ends        | decision thread | follower        | release/acquire: what was done before lies in the architecture |
 /// | Rule::in_effect, may_prepare | decision thread | preparation thread | relaxed: the thread is asked after it         |
-/// | Rule::status      | decision thread | facts()         | status_mutex_, which the decision thread only tries         |
+/// | Rule::status      | decision thread | facts()         | its own: sequence_cell.hpp; a read that meets a write repeats |
 /// | Rule::held        | follower        | the same        | -                                                           |
 /// | Rule::reports, failure, kept | preparation thread, reserve thread | follower, facts() | told_mutex_                   |
 /// | Rule::hindrance   | follower        | facts()         | told_mutex_                                                 |
@@ -149,6 +150,15 @@ class RuleRunner {
           reserve(actions.reserve, rule.otherwise_after_ns ? rule.about : std::vector<std::string>()) {}
     Action& action(Act act) MAUVE_RT { return acts[static_cast<std::size_t>(act)]; }
     bool is_unsettled() const MAUVE_RT { return acts[0].is_unsettled() || acts[1].is_unsettled(); }
+    /// As the last step of the decision thread left it. [non-rt]
+    RuleStatus shown_status() const noexcept {
+      RuleStatus shown;
+      time_ns_t time_ns = 0;
+      std::uint64_t sequence = 0;
+      while (!status.load(shown, time_ns, sequence)) {  // a write takes less than a microsecond
+      }
+      return shown;
+    }
 
     const RuleActions actions;
     std::array<Action, 2> acts;        // by Act
@@ -166,7 +176,7 @@ class RuleRunner {
     Atomic<bool> in_effect{false};
     Atomic<bool> may_prepare{true};
     bool has_ended{false};  // an action of it, in this step of the decision thread
-    RuleStatus status{};
+    SequenceCell<RuleStatus> status;
     std::uint64_t applied{0};  // of found, by the decision thread
     std::deque<Told> held{};   // decisions behind one whose report is not there yet, that one first
     std::array<std::deque<ActionReport>, kActs> reports{};  // by Act
@@ -187,7 +197,7 @@ class RuleRunner {
   void hear_ends(time_ns_t now_ns) MAUVE_RT;
   void ended(std::size_t index, Act act, Ended how, time_ns_t now_ns) MAUVE_RT;
   void apply_found(std::size_t index, time_ns_t now_ns) MAUVE_RT;
-  void show_status() MAUVE_RT MAUVE_LOCKS_UNSEEN;  // where its mutex is free
+  void show_status() MAUVE_RT;
   bool is_unsettled(std::size_t index) const MAUVE_RT;
   bool commit(std::size_t index) noexcept;
   bool reserve(std::size_t index) noexcept;
@@ -197,7 +207,7 @@ class RuleRunner {
   void load_overlays();
   void keep(Rule& rule);
   bool hinder(Rule& rule, std::string hindrance);
-  std::string problem_of(const Rule& rule) const MAUVE_REQUIRES(told_mutex_);
+  std::string problem_of(const Rule& rule, const RuleStatus& status) const MAUVE_REQUIRES(told_mutex_);
   void report(std::size_t index);
   void deliver(Rule& rule, Act act, ActionReport report);
   bool look_around();
@@ -223,11 +233,11 @@ class RuleRunner {
   Atomic<std::uint32_t> ending_{0};
   Thread decision_thread_;
   Thread follower_;
+  std::uint64_t shown_{0};     // the decision thread's: how often it has shown the status of the rules
   std::uint64_t made_{0};      // the follower's: how many decisions
   std::uint64_t followed_{0};  // the follower's: the revision at which preparation threads were asked
   time_ns_t epoch_ns_{0};      // of the deployment that it was started in
   bool runs_{false};
-  mutable PiMutex status_mutex_;
   mutable Mutex told_mutex_;
   ConditionVariable told_changed_;
   std::deque<Told> told_ MAUVE_GUARDED_BY(told_mutex_);
