@@ -81,7 +81,7 @@ class OutsideFeeds:
         return self._peers
 
     def _open(self, file: RulesFile, number: int, spec: SignalSpec) -> None:
-        if spec.kind in ("message", "field"):
+        if spec.kind in ("message", "arrival", "field"):
             leaf = self._types.get((spec.target, spec.detail))
             if leaf is not None:  # else it cannot be heard here, and the rules know that
                 hear = partial(self._hear, number, spec.detail)

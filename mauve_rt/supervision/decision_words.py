@@ -22,6 +22,7 @@ class Words(NamedTuple):
 # Of each kind of condition; `{name}`: what it was told. One that is not here is told by its name.
 _WORDS: Mapping[str, Words] = {
     "silence": Words("nothing on {of} for {measured:.2f} s", "samples on {of}"),
+    "link_silence": Words("nothing arrived on {of} for {measured:.2f} s", "messages arrive on {of}"),
     "value": Words("{field} of {of} is {measured:g}", "{field} of {of} is {measured:g}"),
     "boolean": Words("{of} says so", "{of} says otherwise"),
     "overruns": Words("{component} has overrun", "{component} overruns no more"),

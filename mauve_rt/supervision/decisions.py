@@ -44,7 +44,7 @@ def decision_of(
         decision=made.decision,
         reason=reason or reason_of(made, rules, name=name, failure=failure),
         act="" if made.decision in _WITHOUT_ACT else made.act,
-        silence_s=made.measured if rule.when.kind == "silence" else NO_SILENCE_S,
+        silence_s=made.measured if rule.when.kind in ("silence", "link_silence") else NO_SILENCE_S,
         measured=made.measured,
         revision=revision,
         message=message,

@@ -119,7 +119,7 @@ class RecordedSignals:
         """The full name of the topic that a signal is about; empty when it is about none."""
         if signal.kind == "diagnostic":
             return _DIAGNOSTICS
-        if signal.kind not in ("message", "field"):
+        if signal.kind not in ("message", "arrival", "field"):
             return ""
         if signal.target.startswith("~/"):
             return f"{self._node}/{signal.target[2:]}"
@@ -181,7 +181,7 @@ class RecordedSignals:
 
 def _values(message: Message, signal: SignalSpec) -> Iterator[float]:
     """What one message tells a signal."""
-    if signal.kind == "message":
+    if signal.kind in ("message", "arrival"):
         yield 0.0
     elif signal.kind == "field":
         yield field_value(message.msg, signal.detail)

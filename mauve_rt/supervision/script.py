@@ -34,7 +34,7 @@ LONGEST_S = 3600.0
 SHORTEST_PERIOD_S = 0.001
 # What each line may be about: the signals of the engine that it tells.
 _SIGNALS: Mapping[str, tuple[str, ...]] = {
-    "topic": ("message", "field"),
+    "topic": ("message", "arrival", "field"),
     "resource": ("write", "field"),
     "overruns": ("overruns",),
     "late": ("late",),

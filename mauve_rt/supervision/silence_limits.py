@@ -22,7 +22,7 @@ def limit_warnings(
     """
     for rule in file.rules.rules:
         for leaf in rule.when.leaves():
-            if leaf.kind != "silence":
+            if leaf.kind not in ("silence", "link_silence"):
                 continue
             limit_s = float(leaf.parameters["longer_than_s"])
             for writer, period_s in _writers(leaf, model, periods_s):

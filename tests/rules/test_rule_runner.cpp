@@ -945,12 +945,29 @@ TYPED_TEST(RuleRunnerTest, HearsAValueAndItsComingBack) {
   EXPECT_EQ("t/Core", this->present());
 }
 
-TYPED_TEST(RuleRunnerTest, HearsArrivalsThatAreNotWrittenYet) {
-  this->add_rule(silent());
+TYPED_TEST(RuleRunnerTest, ALinkIsNotSilentWhileMessagesArriveThatAreNotWrittenYet) {
+  this->topics = {{"radio/in", "beat"}};
+  this->add_rule(leaf("link_silence", {{"topic", "radio/in"}, {"longer_than_s", 0.05}}));
   this->deploy();
   this->begin();
   this->see("done");
   this->beat.arrived(1);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(RuleRunnerTest, ATopicIsSilentUntilAMessageCanBeRead) {
+  this->topics = {{"radio/in", "beat"}};
+  this->add_rule(leaf("silence", {{"topic", "radio/in"}, {"longer_than_s", 0.05}}));
+  this->deploy();
+  this->begin();
+  this->see("done");
+  for (int i = 0; i < 10; ++i) {
+    this->beat.arrived(1);
+    this->live(ms_to_ns(20));
+  }
+  EXPECT_EQ("t/Counting", this->present());
+  this->beat.write.write({.value = 1.0}, 1);
   this->see("done");
   EXPECT_EQ("t/Core", this->present());
 }

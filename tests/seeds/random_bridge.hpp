@@ -167,10 +167,11 @@ class RandomBridge {
         return take_log();
       default: {
         std::set<std::string> silent;
+        std::set<std::string> links;
         for (const std::string& name : kIn) {
-          if (dice_.once_in(2)) silent.insert(name);
+          if (dice_.once_in(2)) (dice_.once_in(2) ? silent : links).insert(name);
         }
-        attempt("listen for silence", [&] { bridge_->listen_for_silence(silent); });
+        attempt("listen for silence", [&] { bridge_->listen_for_silence(silent, links); });
       }
     }
   }

@@ -68,6 +68,9 @@ struct BridgeReport {
 /// Which receiver's thread takes what arrives: calls wait for nobody's messages, nor the other way round.
 enum class Lane { messages, requests, events };
 
+/// What rules listen for at a resource: what can be read, or what the link brings, which may have to wait to be written.
+enum class Silence { none, of_writes, of_link };
+
 /// An rcl entity and the resource behind it. Used by one thread at a time, or as its parts say.
 class Binding {
  public:
@@ -90,9 +93,9 @@ class Binding {
   virtual time_ns_t next_look_ns() const { return kForever; }
   /// What its receivers wait for. [non-rt]
   virtual std::vector<Arrival*> arrivals(Lane /*lane*/) { return {}; }
-  /// Whether rules listen for the silence of its resource: then it reports arrivals as early as it can, and that
-  /// there are none. Its receivers are stopped. [non-rt] Throws Error when rcl refuses.
-  virtual void listen_for_silence(bool /*on*/) {}
+  /// Whose silence rules listen for: it reports that nothing waits to be written, and of a link arrivals as early as it can.
+  /// Its receivers are stopped. [non-rt] Throws Error when rcl refuses.
+  virtual void listen_for_silence(Silence /*of*/) {}
   virtual void report(BridgeReport& report) const = 0;
 
  protected:

@@ -49,7 +49,7 @@ void Bridge::attach(const std::vector<std::size_t>& numbers) {
     for (const std::size_t number : numbers) {
       Binding& binding = *bindings_.at(number);
       binding.attach(architecture_.hold_resource(binding.resource_name()));
-      binding.listen_for_silence(silent_.contains(binding.resource_name()));
+      binding.listen_for_silence(silence_of(binding));
     }
   } catch (...) {
     start_receivers();
@@ -59,13 +59,20 @@ void Bridge::attach(const std::vector<std::size_t>& numbers) {
   architecture_.publications().notify();  // of what was written before
 }
 
-void Bridge::listen_for_silence(std::set<std::string> resources) {
+Silence Bridge::silence_of(const Binding& binding) const {
+  const std::string& resource = binding.resource_name();
+  if (links_.contains(resource)) return Silence::of_link;
+  return silent_.contains(resource) ? Silence::of_writes : Silence::none;
+}
+
+void Bridge::listen_for_silence(std::set<std::string> resources, std::set<std::string> links) {
   silent_ = std::move(resources);
+  links_ = std::move(links);
   stop_receivers();
   try {
     const LockGuard lock(mutex_);
     for (const auto& [number, binding] : bindings_) {
-      if (binding->is_attached()) binding->listen_for_silence(silent_.contains(binding->resource_name()));
+      if (binding->is_attached()) binding->listen_for_silence(silence_of(*binding));
     }
   } catch (...) {
     start_receivers();

@@ -51,8 +51,9 @@ class Bridge {
 
   /// These serve the resources of their names from now on. [non-rt] Throws Error when one is none to serve.
   void attach(const std::vector<std::size_t>& numbers);
-  /// Rules listen for the silence of these resources, and of no others. [non-rt] Throws Error when rcl refuses.
-  void listen_for_silence(std::set<std::string> resources);
+  /// Rules listen for the silence of these resources, and of the links that those are bound to, and of no others. [non-rt]
+  /// Throws Error when rcl refuses.
+  void listen_for_silence(std::set<std::string> resources, std::set<std::string> links);
   /// These end; what was written before is sent. [non-rt]
   void close(const std::vector<std::size_t>& numbers);
 
@@ -70,6 +71,7 @@ class Bridge {
  private:
   template <typename Kind, typename... Args>
   std::size_t open(const Args&... args);
+  Silence silence_of(const Binding& binding) const;
   bool send_some();
   time_ns_t next_look_ns();
   void send_all();
@@ -84,6 +86,7 @@ class Bridge {
   std::map<std::size_t, std::unique_ptr<Binding>> bindings_;
   std::size_t opened_{0};
   std::set<std::string> silent_;  // resources whose silence rules listen for
+  std::set<std::string> links_;   // those of which they listen for the silence of the link
   Receiver messages_{node_, "topics_in"};
   Receiver requests_{node_, "requests_in"};  // the resource's own code runs here
   Receiver events_{node_, "topic_events"};   // few, so that waiting for messages stays cheap

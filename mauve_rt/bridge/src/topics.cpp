@@ -114,15 +114,14 @@ std::vector<Arrival*> IncomingTopic::arrivals(Lane lane) {
   return all;
 }
 
-void IncomingTopic::listen_for_silence(bool on) {
-  if (on == listens_) return;
-  if (on && settings_.qos.reliability != RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT)
+void IncomingTopic::listen_for_silence(Silence of) {
+  if (of == silence_) return;
+  const bool is_repaired = settings_.qos.reliability != RMW_QOS_POLICY_RELIABILITY_BEST_EFFORT;
+  twin_.reset();
+  if (of == Silence::of_link && is_repaired)
     twin_ = std::make_unique<ArrivalTwin>(node_, settings_, static_cast<const Arrival&>(*this), resource());
-  if (!on) {
-    twin_.reset();
-    resource().caught_up(kForever);
-  }
-  listens_ = on;
+  if (of == Silence::none) resource().caught_up(kForever);
+  silence_ = of;
 }
 
 void IncomingTopic::join(rcl_wait_set_t& set) {

@@ -101,13 +101,13 @@ class IncomingTopic final : public BoundTopic, private Arrival {
   IncomingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number, TopicLog& log);
 
   std::vector<Arrival*> arrivals(Lane lane) override;
-  void listen_for_silence(bool on) override;
+  void listen_for_silence(Silence of) override;
 
  private:
   void join(rcl_wait_set_t& set) override;
   bool has_arrived(const rcl_wait_set_t& set) const override;
   void take() override;
-  bool wants_idle() const override { return listens_ && twin_ == nullptr; }
+  bool wants_idle() const override { return silence_ != Silence::none && twin_ == nullptr; }
   void idle(time_ns_t until_ns) override { resource().caught_up(until_ns); }
   std::string full_name() const override { return rcl_subscription_get_topic_name(subscription_.get()); }
   const TopicEvents& events() const override { return events_; }
@@ -116,8 +116,8 @@ class IncomingTopic final : public BoundTopic, private Arrival {
   const TopicSettings settings_;
   Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
   OwnedMessage message_;
-  std::unique_ptr<ArrivalTwin> twin_;  // while rules listen for silence, of a reliable subscription
-  bool listens_{false};
+  std::unique_ptr<ArrivalTwin> twin_;  // while rules listen for silence of the link, of a reliable subscription
+  Silence silence_{Silence::none};
   std::size_t place_{0};  // in the wait set
   TopicEvents events_;    // end before the entity that they are of
 };

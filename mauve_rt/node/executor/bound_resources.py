@@ -145,15 +145,15 @@ class BoundResources:
                 self._require_bridge().attach([number for numbers in opened.values() for number in numbers])
                 self._numbers.update(opened)
 
-    def listen_for_silence(self, resources: Iterable[str]) -> None:
-        """Rules listen for the silence of these resources, and of no others.
+    def listen_for_silence(self, resources: Iterable[str], links: Iterable[str]) -> None:
+        """Rules listen for the silence of these resources, and of the links to `links`, and of no others.
 
         Raises:
             MauveError: the middleware refuses.
         """
         with self._lock:
             if self._bridge is not None:
-                self._bridge.listen_for_silence(set(resources))
+                self._bridge.listen_for_silence(set(resources), set(links))
 
     def discard(self, opened: Mapping[str, list[int]]) -> None:
         """Close what was opened for resources that did not come to be."""

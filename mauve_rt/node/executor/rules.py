@@ -53,7 +53,7 @@ class OwnRules:
         runtime: Runtime,
         *,
         topics: Callable[[], dict[str, str]],
-        listen: Callable[[set[str]], None],
+        listen: Callable[[set[str], set[str]], None],
         publish: Callable[[Any, str, Any, QoSProfile], None],
         event: Callable[[Request, Outcome], None],
         follow: Callable[[], None],
@@ -62,7 +62,9 @@ class OwnRules:
     ) -> None:
         """`topics`: those that resources are bound to; `publish` sends and records a message.
 
-        `listen` takes the resources for whose silence rules listen. load() reads files below `folder` only.
+        `listen` takes the resources whose silence rules wait for, and those whose link's.
+
+        load() reads files below `folder` only.
 
         `event` tells of what was done; `follow` lets parameters follow it.
         """
@@ -192,7 +194,7 @@ class OwnRules:
         released = [self._known[each.rule] for each in self._at_work() if each.rule not in names]
         runner = loaded.runner(self._runtime.host, topics, self._rested)
         self._rested = None
-        self._listen(_silent(loaded.rules, topics))
+        self._listen(*(_silent(kind, loaded.rules, topics) for kind in ("silence", "link_silence")))
         overlays = self._runtime.architecture.overlays
         for name in names:
             overlays.move(name, KEPT, "")  # it goes on
@@ -209,7 +211,7 @@ class OwnRules:
             return
         runner.stop()
         self._rested = runner
-        self._listen(set())
+        self._listen(set(), set())
         self._ending.set()
         runner.wake()
         if self._thread is not None:
@@ -313,9 +315,9 @@ class OwnRules:
         return type(now)(nanoseconds=now.nanoseconds - past_ns, clock_type=now.clock_type).to_msg()
 
 
-def _silent(rules: Sequence["Rule"], topics: Mapping[str, str]) -> set[str]:
-    """The resources whose silence rules wait for."""
-    silences = [leaf.parameters for rule in rules for leaf in rule.when.leaves() if leaf.kind == "silence"]
+def _silent(kind: str, rules: Sequence["Rule"], topics: Mapping[str, str]) -> set[str]:
+    """The resources that conditions of this kind are about."""
+    silences = [leaf.parameters for rule in rules for leaf in rule.when.leaves() if leaf.kind == kind]
     return {str(one.get("resource") or topics.get(str(one.get("topic")), "")) for one in silences} - {""}
 
 

@@ -16,6 +16,7 @@
 // NOLINTNEXTLINE(cppcoreguidelines-macro-usage): one line a kind, that declares and lists it
 #define MAUVE_CONDITION_KINDS(X) \
   X(silence)                     \
+  X(link_silence)                \
   X(value)                       \
   X(overruns)                    \
   X(late)                        \

@@ -42,10 +42,14 @@ Feeds::~Feeds() = default;
 void Feeds::open(const SignalSpec& spec, Signal& signal) {
   switch (spec.kind) {
     case SignalKind::message:
-      feeds_[&signal] = open_write_feed(resource_of(spec.target), signal, place_);
+      feeds_[&signal] = open_write_feed(resource_of(spec.target), Heard::writes, signal, place_);
       return;
     case SignalKind::write:
-      feeds_[&signal] = open_write_feed(spec.target, signal, place_);
+      feeds_[&signal] = open_write_feed(spec.target, Heard::writes, signal, place_);
+      return;
+    case SignalKind::arrival:
+      feeds_[&signal] =
+          open_write_feed(resource_of(spec.target), Heard::writes_and_arrivals, signal, place_);
       return;
     case SignalKind::field: {
       const auto topic = place_.topics.find(spec.target);

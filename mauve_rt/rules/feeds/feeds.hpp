@@ -9,8 +9,10 @@
 
 namespace mauve::rules {
 
-/// Of the writes to a resource. [setup] Throws Error (unknown_resource).
-std::unique_ptr<Feed> open_write_feed(const std::string& resource, Signal& signal, const FeedPlace& place);
+enum class Heard { writes, writes_and_arrivals };
+/// Of the writes to a resource, or also of messages for it that are not written yet. [setup] Throws Error (unknown_resource).
+std::unique_ptr<Feed> open_write_feed(const std::string& resource, Heard what, Signal& signal,
+                                      const FeedPlace& place);
 /// Of a number in what is written to a resource. [setup] Throws Error: unknown_resource; invalid_argument: there is none.
 std::unique_ptr<Feed> open_field_feed(const std::string& resource, const std::string& path, Signal& signal,
                                       const FeedPlace& place);

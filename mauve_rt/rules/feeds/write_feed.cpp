@@ -5,7 +5,8 @@ namespace mauve::rules {
 
 namespace {
 
-/// The writes to a resource and the messages that have arrived for it, by the clock of who receives them: what a writer says of its time counts for nothing.
+/// The writes to a resource, or also the messages that have arrived for it, by the clock of who receives them: what a writer
+/// says of its time counts for nothing.
 ///
 /// | member    | written by       | read by | under                                        |
 /// | --------- | ---------------- | ------- | -------------------------------------------- |
@@ -13,10 +14,11 @@ namespace {
 /// | signal_   | writers          | engine   | the resource's listeners' lock: one at once |
 class WriteFeed final : public Feed, private EventListener {
  public:
-  WriteFeed(std::string resource, Signal& signal, const FeedPlace& place)
+  WriteFeed(std::string resource, Heard what, Signal& signal, const FeedPlace& place)
       : architecture_(place.architecture),
         clock_(place.clock),
         name_(std::move(resource)),
+        what_(what),
         signal_(signal),
         resource_(architecture_.hold_resource(name_)) {
     resource_->listen(*this);
@@ -33,7 +35,9 @@ class WriteFeed final : public Feed, private EventListener {
 
  private:
   void on_event(time_ns_t /*written_ns*/) noexcept override { signal_.tell(clock_.now_ns(), 0); }
-  void on_arrival(time_ns_t /*arrived_ns*/) noexcept override { signal_.tell(clock_.now_ns(), 0); }
+  void on_arrival(time_ns_t /*arrived_ns*/) noexcept override {
+    if (what_ == Heard::writes_and_arrivals) signal_.tell(clock_.now_ns(), 0);
+  }
   void on_caught_up(time_ns_t until_ns) noexcept override { signal_.set_reported_until(until_ns); }
 
   void let_go() noexcept {
@@ -44,14 +48,16 @@ class WriteFeed final : public Feed, private EventListener {
   Architecture& architecture_;
   const Clock& clock_;
   const std::string name_;
+  const Heard what_;
   Signal& signal_;
   std::shared_ptr<Resource> resource_;  // nullptr: it was removed
 };
 
 }  // namespace
 
-std::unique_ptr<Feed> open_write_feed(const std::string& resource, Signal& signal, const FeedPlace& place) {
-  return std::make_unique<WriteFeed>(resource, signal, place);
+std::unique_ptr<Feed> open_write_feed(const std::string& resource, Heard what, Signal& signal,
+                                      const FeedPlace& place) {
+  return std::make_unique<WriteFeed>(resource, what, signal, place);
 }
 
 }  // namespace mauve::rules

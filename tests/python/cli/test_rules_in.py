@@ -24,6 +24,7 @@ WHEN = "    when: {"
 
 HEARD = {  # by the executor itself
     "silence": "silence: {topic: set_point, longer_than_s: 1}",
+    "link_silence": "link_silence: {topic: set_point, longer_than_s: 1}",
     "value": "value: {resource: told, field: data, above: 1}",
     "overruns": "overruns: {component: eager}",
     "late": "late: {component: eager, longer_than_s: 0.001}",

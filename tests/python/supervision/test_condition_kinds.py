@@ -18,6 +18,7 @@ GOOD = {
         "silence: {topic: /radio, type: std_msgs/msg/Empty, longer_than_s: 0.5}",
         "silence: {resource: pose, longer_than_s: 1.5}",
     ],
+    "link_silence": ["link_silence: {topic: radio/in, longer_than_s: 1}"],
     "value": [
         "value: {topic: battery, field: percentage, below: 0.2, hysteresis: 0.05}",
         "value: {resource: pose, field: 'position[2].x', above: 10, below: -10}",
@@ -56,6 +57,7 @@ BAD = [
     ("^value: {resource: pose, field: x}", "expected above, below, or both, found neither"),
     ("^value: {field: x, above: 1}", "expected a topic or a resource, found neither"),
     # missing
+    ("^link_silence: {longer_than_s: 1}", "link_silence.topic is missing"),
     ("^silence: {topic: in}", "silence.longer_than_s is missing"),
     ("^value: {topic: in, above: 1}", "value.field is missing"),
     ("^overruns: {at_least: 2}", "overruns.component is missing"),

@@ -12,6 +12,7 @@ from mauve_rt.supervision.when_spec import heard
 # A condition, what tells it something, and the values told.
 TOLD = [
     ("silence: {topic: in, longer_than_s: 1}", {"topic": "in", "every_s": 1.0}, [0.0, 0.0, 0.0]),
+    ("link_silence: {topic: in, longer_than_s: 1}", {"topic": "in", "every_s": 1.0}, [0.0, 0.0, 0.0]),
     ("silence: {resource: in, longer_than_s: 1}", {"resource": "in", "from_s": 1.5}, [0.0]),
     ("value: {topic: in, field: x, above: 1}", {"topic": "in", "value": 3.5}, [3.5]),
     ("boolean: {topic: in}", {"topic": "in", "value": 1.0}, [1.0]),

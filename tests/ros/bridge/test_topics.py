@@ -286,7 +286,7 @@ def test_a_topic_of_another_type_is_refused_and_nothing_stays_open(bind: Bind, g
     graph.spin_until(lambda: graph.node.count_publishers("/robot/first") == 0, "the first topic's end")
 
 
-def test_silence_is_listened_for_by_best_effort_too(bind: Bind, graph: Any) -> None:
+def test_the_silence_of_a_link_is_listened_for_by_best_effort_too(bind: Bind, graph: Any) -> None:
     """While rules listen; a message is written once all the same. A best-effort topic needs no second one."""
     bound = bind("""\
   sure: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: sure, direction: subscribe}}
@@ -294,12 +294,14 @@ def test_silence_is_listened_for_by_best_effort_too(bind: Bind, graph: Any) -> N
           topic: {name: quick, direction: subscribe, qos: best_effort}}
 """)
     sure, quick = (graph.voice(Float64, f"/robot/{name}") for name in ("sure", "quick"))
-    bound.topics.listen_for_silence({"sure", "quick"})
+    bound.topics.listen_for_silence({"sure", "quick"}, ())
+    assert sure.get_subscription_count() <= 1
+    bound.topics.listen_for_silence((), {"sure", "quick"})
     graph.spin_until(lambda: sure.get_subscription_count() == 2, "the second subscription")
     for _ in range(5):
         sure.publish(Float64(data=1.0))
     graph.spin_until(lambda: bound.report("/robot/sure").passed >= 5, "the messages")
     assert quick.get_subscription_count() == 1
-    bound.topics.listen_for_silence(())
+    bound.topics.listen_for_silence({"sure"}, ())
     graph.spin_until(lambda: sure.get_subscription_count() == 1, "the second subscription to be gone")
     assert bound.report("/robot/sure").passed == 5

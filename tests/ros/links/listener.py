@@ -29,7 +29,7 @@ _RULES = """\
 mauve: 1
 rules:
   - name: quiet
-    when: {silence: {topic: /talk, longer_than_s: LIMIT}}
+    when: {KIND: {topic: /talk, longer_than_s: LIMIT}}
     do: [{kind: replace_core, target: metronome, name: mauve_examples/Accelerando}]
     undo: {for_s: UNDO, do: [{kind: replace_core, target: metronome, name: mauve_examples/Metronome}]}
 """
@@ -44,6 +44,7 @@ class Listener:
         *,
         limit_s: float,
         undo_s: float,
+        kind: str = "silence",
         qos: str = "reliable",
         wrapper: Sequence[str] = (),
         environment: dict[str, str] | None = None,
@@ -51,7 +52,7 @@ class Listener:
         """Start it."""
         architecture, rules = folder / "listener.yaml", folder / "rules.yaml"
         architecture.write_text(_ARCHITECTURE.replace("QOS", qos), encoding="utf-8")
-        text = _RULES.replace("LIMIT", str(limit_s)).replace("UNDO", str(undo_s))
+        text = _RULES.replace("KIND", kind).replace("LIMIT", str(limit_s)).replace("UNDO", str(undo_s))
         rules.write_text(text, encoding="utf-8")
         self.executor = ExecutorProcess(
             folder,

@@ -1,4 +1,4 @@
-"""An executor's own rule of silence, and a link that is bad in every way: only a cut is silence.
+"""An executor's own rule of a link's silence, and a link that is bad in every way: only a cut is silence.
 
 A talker of 10 Hz, a limit of 1 s, reliable delivery, which stands still for up to a second while it repairs.
 The link is a program of the test's, since netem and nftables may be missing. Asserted are order and counts.
@@ -61,6 +61,7 @@ class Link:
             folder,
             limit_s=LIMIT_S,
             undo_s=UNDO_S,
+            kind="link_silence",
             wrapper=self.hosts.wrapper("robot_1"),
             environment=_RANGE,
         )
