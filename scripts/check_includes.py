@@ -50,6 +50,8 @@ RULES = (
     rule("mauve_rt/rules", ROS, "rules are at work where there is no ROS"),
     rule("mauve_rt/rules", PYTHON, "rules are at work where there is no Python"),
     rule("mauve_rt/rules", r"mauve_examples/", "rules do not know the examples"),
+    rule("mauve_rt/driver", ROS, "a driver needs the standard library only"),
+    rule("mauve_rt/driver", r"mauve_rt/(?!driver/)", "a driver needs the standard library only"),
     rule("mauve_rt/bindings", ROS, "bindings translate the kernel only; ROS belongs in the bridge"),
     rule("mauve_rt/bindings", r"mauve_examples/", "bindings do not know the examples"),
     rule("mauve_rt/bridge", r"mauve_examples/", "the bridge does not know the examples"),

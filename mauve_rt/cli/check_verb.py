@@ -63,11 +63,14 @@ def _check_architecture(path: Path) -> "ArchitectureModel":
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
     from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
+    from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
     architecture = build(model, PluginRegistry())
     configure(model, architecture)
     architecture.cleanup()
+    if late := late_writers(model):
+        raise ArchitectureFileError(path, late)
     for warning in file_warnings(model):
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
     counts = {

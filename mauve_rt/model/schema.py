@@ -262,6 +262,37 @@ class TopicModel(Section):
         "quality of service: the name of a profile, or a mapping with the keys below",
         default=QosModel(),
     )
+    driver_timeout_ms: float | None = setting(
+        _DURATION_MS,
+        "of what is published: the silence after which its driver is safe by itself, and the deadline that "
+        "is offered; 0: no driver acts on it",
+        default=None,
+    )
+
+    @property
+    def offered_qos(self) -> QosModel:
+        """`qos`, with the deadline that a driver may count on."""
+        if not self.driver_timeout_ms or self.qos.deadline_ms:
+            return self.qos
+        return self.qos.changed(deadline_ms=self.driver_timeout_ms)
+
+    def misfit(self) -> Fault | None:
+        """A driver receives what is published, in time."""
+        if self.driver_timeout_ms is None:
+            return None
+        found = self.driver_timeout_ms
+        if self.direction != "publish":
+            fault = Fault(
+                ("driver_timeout_ms",), "form", limit="no such key, as the topic is subscribed", found=found
+            )
+            fault.hint = "leave it out; a rule with silence notices that nothing comes"
+            return fault
+        if 0 < found < self.qos.deadline_ms:
+            limit = f"no less than deadline_ms, which is {self.qos.deadline_ms:g}"
+            fault = Fault(("driver_timeout_ms",), "form", limit=limit, found=found)
+            fault.hint = "leave deadline_ms out: the driver's time is offered"
+            return fault
+        return None
 
 
 class ServiceModel(Section):

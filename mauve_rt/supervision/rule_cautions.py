@@ -4,10 +4,9 @@ from collections.abc import Iterator
 
 from mauve_rt.errors import Problem
 from mauve_rt.model import ArchitectureModel
-from mauve_rt.supervision.effects import touched
 from mauve_rt.supervision.rehearsal import Rehearsal
 from mauve_rt.supervision.rules import Rule, RulesFile
-from mauve_rt.supervision.silence_limits import limit_warnings, listened_to, writers_of
+from mauve_rt.supervision.silence_limits import limit_warnings, listened_to
 from mauve_rt.supervision.when_spec import heard
 
 
@@ -26,7 +25,6 @@ def model_warnings(file: RulesFile, model: ArchitectureModel, executor: Rehearsa
         yield from _redundant_undo(file, index, rule, executor)
         if rule.safety:
             yield from _forgotten_inputs(file, rule, model)
-            yield from _endless_outputs(file, index, rule, model)
 
 
 def _redundant_undo(file: RulesFile, index: int, rule: Rule, executor: Rehearsal) -> Iterator[Problem]:
@@ -53,19 +51,3 @@ def _forgotten_inputs(file: RulesFile, rule: Rule, model: ArchitectureModel) -> 
             )
             remedy = "publish and bind the topic with qos: transient_local, or state its deadline_ms"
             yield file.problem((*leaf.place, leaf.kind), what, remedy=remedy)
-
-
-def _endless_outputs(file: RulesFile, index: int, rule: Rule, model: ArchitectureModel) -> Iterator[Problem]:
-    """Topics on which the components of a safety rule send to drivers that may go on without a message."""
-    components = touched(rule.do)
-    for name, resource in model.resources.items():
-        topic = resource.topic
-        if topic is None or topic.direction != "publish" or topic.qos.deadline_ms:
-            continue
-        if components & writers_of(name, model):
-            what = (
-                f"safety rule '{rule.name}' cannot help where the executor dies or the network fails: topic "
-                f"{topic.name} has no deadline at which its driver stops by itself"
-            )
-            remedy = "state its deadline_ms, and let the driver stop when it is missed"
-            yield file.problem(("rules", index, "safety"), what, remedy=remedy)

@@ -2,6 +2,7 @@
 
 from mauve_rt.errors import Problem
 from mauve_rt.model import ArchitectureModel, PluginIndex
+from mauve_rt.supervision.drivers import unbounded_outputs
 from mauve_rt.supervision.rule_actions import unprepared
 from mauve_rt.supervision.rule_hearing import only_outside
 from mauve_rt.supervision.rule_names import name_findings
@@ -23,9 +24,10 @@ def all_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Probl
 
 
 def standing_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Problem]:
-    """Names that are not there, and what who runs a rule can neither hear nor make ready."""
+    """Names that are not there, what cannot be heard or made ready, outputs that say nothing of drivers."""
     plugins = PluginIndex.installed()
     steps = (
         problem for index in range(len(file.rules.rules)) for problem in unprepared(file, index, plugins)
     )
-    return [*name_findings(file, model), *only_outside(file), *steps]
+    outputs = unbounded_outputs(file, model) if model is not None else ()
+    return [*name_findings(file, model), *only_outside(file), *steps, *outputs]

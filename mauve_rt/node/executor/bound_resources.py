@@ -126,7 +126,7 @@ class BoundResources:
             raise TopicError(full_name, name, expected=resource.topic_type, found=" and ".join(others))
         for remark in qos_remarks(topic):
             self._node.get_logger().warning(remark_text(name, topic, remark))
-        qos = qos_profile(topic.qos, capacity=resource.parameters.get("capacity", 0))
+        qos = qos_profile(topic.offered_qos, capacity=resource.parameters.get("capacity", 0))
         bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
         number = bind(name, topic.name, resource.topic_type, native_qos(qos))
         self._topics[number] = _BoundTopic(

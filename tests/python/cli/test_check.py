@@ -145,6 +145,33 @@ def test_rules_beside_an_architecture_do_and_undo(
     assert words in error
 
 
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("subscribe, driver_timeout_ms: 200", "expected no such key, as the topic is subscribed"),
+        (
+            "publish, driver_timeout_ms: 200, qos: {deadline_ms: 201}",
+            "expected no less than deadline_ms, which is 201",
+        ),
+        (
+            "publish, driver_timeout_ms: 5",
+            "the driver of resource 'out' is safe after 5 ms of silence, and component 'one' writes every ",
+        ),
+        ("publish, driver_timeout_ms: 0", ""),
+        ("publish, driver_timeout_ms: 500, qos: {deadline_ms: 100}", ""),
+    ],
+)
+def test_a_driver_that_could_not_wait(check: Check, said: str, words: str) -> None:
+    out = (
+        f"  out: {{kind: shared_data, type: std_msgs/msg/Float64, topic: {{name: out, direction: {said}}}}}\n"
+    )
+    robot = ROBOT.replace("connections:\n", f"{out}connections:\n  - [one.count, out.write]\n")
+    status, _, errors = check(robot=robot)
+    assert status == (2 if words else 0)
+    assert all(words in error for error in errors)
+    assert len(errors) == bool(words)
+
+
 def test_a_subscription_that_no_ordinary_publisher_matches_is_a_warning(check: Check) -> None:
     status, out, errors = check(
         robot=ROBOT.replace("direction: subscribe", "direction: subscribe, qos: {deadline_ms: 200}")

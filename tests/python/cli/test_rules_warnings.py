@@ -62,12 +62,21 @@ def test_a_safety_rule_on_a_topic_that_keeps_nothing(check: Check, when: str, qo
         assert check(rule(when=when, undo=BACK), robot=robot)[2] == [], "it is no safety rule"
 
 
-@pytest.mark.parametrize(("qos", "warned"), [("", 1), (", qos: {deadline_ms: 100}", 0)])
+@pytest.mark.parametrize(
+    ("said", "is_wrong"),
+    [
+        ("", True),
+        (", qos: {deadline_ms: 100}", True),
+        (", driver_timeout_ms: 100", False),
+        (", driver_timeout_ms: 0", False),
+    ],
+)
 def test_a_safety_rule_about_a_driver_that_does_not_stop_by_itself(
-    check: Check, qos: str, warned: int
+    check: Check, said: str, *, is_wrong: bool
 ) -> None:
-    status, _, errors = check(rule(more=SAFETY, undo=BACK), robot=driven(qos))
-    assert status == 0
-    assert len(errors) == warned, errors
-    if warned:
-        assert "topic motor has no deadline at which its driver stops by itself" in errors[0]
+    status, _, errors = check(rule(more=SAFETY, undo=BACK), robot=driven(said))
+    assert (status, len(errors)) == ((1, 1) if is_wrong else (0, 0)), errors
+    if is_wrong:
+        assert errors[0].startswith("rules:7:13: safety rule 'quiet' cannot help where the executor dies")
+        assert "resource 'out', topic motor, does not say when its driver is safe by itself" in errors[0]
+        assert check(rule(undo=BACK), robot=driven(said))[0] == 0, "it is no safety rule"
