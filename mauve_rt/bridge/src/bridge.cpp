@@ -14,6 +14,8 @@ namespace mauve::bridge {
 namespace {
 
 constexpr time_ns_t kLook = s_to_ns(1);  // so often the sending thread looks even when nobody wakes it
+constexpr int kSentAtOnce = 64;          // of one binding before the others have their turn
+constexpr int kHighestPriority = 99;
 
 }  // namespace
 
@@ -51,12 +53,15 @@ void Bridge::attach(const std::vector<std::size_t>& numbers) {
       binding.attach(architecture_.hold_resource(binding.resource_name()));
       binding.listen_for_silence(silent_.contains(binding.resource_name()));
     }
+    const LockGuard stops(stops_mutex_);
+    list_stoppable();
   } catch (...) {
     start_receivers();
     throw;
   }
   start_receivers();
   architecture_.publications().notify();  // of what was written before
+  architecture_.stops().notify();
 }
 
 void Bridge::listen_for_silence(std::set<std::string> resources) {
@@ -77,10 +82,16 @@ void Bridge::listen_for_silence(std::set<std::string> resources) {
 void Bridge::close(const std::vector<std::size_t>& numbers) {
   while (send_some()) {
   }
+  for (const std::size_t number : numbers) {  // no other thread opens or closes one now
+    if (const auto found = bindings_.find(number); found != bindings_.end() && found->second->is_attached())
+      found->second->settle();
+  }
   stop_receivers();
   {
     const LockGuard lock(mutex_);
+    const LockGuard stops(stops_mutex_);
     for (const std::size_t number : numbers) bindings_.erase(number);
+    list_stoppable();
   }
   start_receivers();
 }
@@ -89,7 +100,11 @@ void Bridge::start() {
   if (running_) return;
   running_ = true;
   ending_.store(false, std::memory_order_release);
+  stops_ending_.store(false, std::memory_order_release);
   sender_ = start_thread("topics_out", [this] { send_all(); }, sender_place_);
+  ThreadPlace stops_place = sender_place_;
+  stops_place.priority = std::min(stops_place.priority + 1, kHighestPriority);
+  stops_sender_ = start_thread("stops_out", [this] { send_all_stops(); }, stops_place);
   start_receivers();
 }
 
@@ -100,12 +115,20 @@ void Bridge::stop() {
   ending_.store(true, std::memory_order_release);
   architecture_.publications().notify();
   sender_.join();
+  stops_ending_.store(true, std::memory_order_release);
+  architecture_.stops().notify();
+  stops_sender_.join();
+  for (const auto& [number, binding] : bindings_) {
+    if (binding->is_attached()) binding->settle();
+  }
 }
 
 void Bridge::close() {
   stop();
   const LockGuard lock(mutex_);
+  const LockGuard stops(stops_mutex_);
   bindings_.clear();
+  list_stoppable();
 }
 
 BridgeReport Bridge::report() {
@@ -118,8 +141,39 @@ BridgeReport Bridge::report() {
 bool Bridge::send_some() {
   const LockGuard lock(mutex_);
   bool more = false;
-  for (const auto& [number, binding] : bindings_) more = (binding->is_attached() && binding->send()) || more;
+  for (const auto& [number, binding] : bindings_) {
+    bool has_more = binding->is_attached();
+    for (int sent = 0; has_more && sent < kSentAtOnce; ++sent) {
+      if (has_stops()) send_stops();
+      has_more = binding->send();
+    }
+    more = more || has_more;
+  }
   return more;
+}
+
+bool Bridge::has_stops() noexcept {
+  return architecture_.stops().word() != stops_sent_.load(std::memory_order_relaxed);
+}
+
+/// Returns when the next copy is due.
+time_ns_t Bridge::send_stops() {
+  const LockGuard lock(stops_mutex_);
+  const std::uint32_t word = architecture_.stops().word();  // before the look: what comes after is noticed
+  // First those on which no other thread is sending: that may last.
+  for (Binding* const binding : stoppable_) binding->send_stops(false);
+  time_ns_t next_ns = kForever;
+  for (Binding* const binding : stoppable_) next_ns = std::min(next_ns, binding->send_stops(true));
+  stops_sent_.store(word, std::memory_order_relaxed);
+  return next_ns;
+}
+
+/// mutex_ held, too.
+void Bridge::list_stoppable() {
+  stoppable_.clear();
+  for (const auto& [number, binding] : bindings_) {
+    if (binding->is_attached()) stoppable_.push_back(binding.get());
+  }
 }
 
 time_ns_t Bridge::next_look_ns() {
@@ -140,6 +194,17 @@ void Bridge::send_all() {
     while (send_some()) {
     }
     if (!ending) written.wait(word, next_look_ns());
+  }
+}
+
+void Bridge::send_all_stops() {
+  Notifier& stops = architecture_.stops();
+  for (;;) {
+    const std::uint32_t word = stops.word();
+    const bool ending = stops_ending_.load(std::memory_order_acquire);
+    const time_ns_t next_ns = send_stops();
+    if (ending && next_ns == kForever) return;
+    stops.wait(word, next_ns);
   }
 }
 

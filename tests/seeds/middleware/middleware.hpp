@@ -37,6 +37,7 @@ struct CarriedMessage {
   std::uint64_t entity;  // the publisher or subscription
   Bytes data;
   bool is_sent{true};
+  std::uint64_t order{0};  // in which all messages began to be published
 };
 /// A message that waits for the bridge.
 struct WaitingMessage {
@@ -83,6 +84,7 @@ class Middleware {
   std::map<std::string, std::vector<CarriedMessage>> published{};  // by topic
   std::map<std::string, std::vector<CarriedMessage>>
       taken{};  // likewise, but by subscriptions that only report arrivals
+  std::uint64_t publishes{0};  // that have begun
   std::vector<SentRequest> requests{};
   std::vector<SentResponse> responses{};
   std::map<std::int64_t, bool> taken_requests{};  // of services, by number; true: the response was refused
@@ -100,6 +102,7 @@ class Middleware {
     Kind kind;
     std::string name{};
     std::size_t depth{0};
+    rmw_qos_profile_t qos{};
     std::uint64_t of{0};  // of an event: its publisher or subscription
     std::deque<WaitingMessage> waiting{};
     bool is_triggered{false};       // of a guard
