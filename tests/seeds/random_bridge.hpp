@@ -255,7 +255,8 @@ class RandomBridge {
       const bool is_copy = is_copied(name, network, number) && number == before && i > 0 &&
                            sent[i].entity == sent[i - 1].entity && sent[i].data == sent[i - 1].data;
       if (is_copy) ++copies;
-      expect(number > before || is_again || is_copy, name + " sends " + text(number) + " after " + text(before));
+      expect(number > before || is_again || is_copy,
+             name + " sends " + text(number) + " after " + text(before));
       before = number;
     }
     findings_.count("sent", static_cast<int>(sent.size()));
@@ -269,9 +270,9 @@ class RandomBridge {
     }
     expect(left == 0.0, name + " has not sent " + text(left));
     if (name == "ring_out")
-      expect(written.size() == sent.size() - copies, "ring_out was written " + std::to_string(written.size()) +
-                                                         " times, and sends " +
-                                                         std::to_string(sent.size() - copies) + " messages");
+      expect(written.size() == sent.size() - copies,
+             "ring_out was written " + std::to_string(written.size()) + " times, and sends " +
+                 std::to_string(sent.size() - copies) + " messages");
     const std::vector<double> numbers = numbers_of(sent);
     for (const double number : written) {
       const auto times = std::ranges::count(numbers, number);
@@ -290,7 +291,9 @@ class RandomBridge {
     for (const CarriedMessage& message : middleware_.published[name])
       sent[message.entity].push_back(number_in_message(message.data));
     for (const auto& [entity, numbers] : sent) {
-      if (!network.stops().contains(numbers.back())) continue;
+      const auto stop = network.stops().find(numbers.back());
+      // Of one that was written during a close its own end may cut the copies off.
+      if (stop == network.stops().end() || stop->second.entity != entity) continue;
       const auto times = std::ranges::count(numbers, numbers.back());
       findings_.count("last outputs of stops");
       expect(are_reliable_[name] ? times >= 1 && times <= 5 : times == 3,
@@ -298,22 +301,38 @@ class RandomBridge {
                  " times");
     }
   }
+  /// When a number began to be sent first, and by whom; no entity: never.
+  CarriedMessage first_sent(const std::string& name, double number) {
+    for (const CarriedMessage& message : middleware_.published[name]) {
+      if (number_in_message(message.data) == number) return message;
+    }
+    return {.entity = 0, .data = {}};
+  }
+  /// Whether a topic had an output of a stop to send, with all that its resource holds before, in that time.
+  bool has_stop_between(const std::string& name, const BridgeNetwork& network, std::uint64_t from,
+                        std::uint64_t to) {
+    return std::ranges::any_of(network.stops(), [&](const auto& each) {
+      const auto& [number, stop] = each;
+      if (stop.name != name || stop.publishes > to) return false;
+      const CarriedMessage first = first_sent(name, number);
+      return first.entity == 0 || first.order > from;
+    });
+  }
   /// The output of a stop goes before all others. One may have been taken from its resource already.
   void check_stops(const BridgeNetwork& network) {
     for (const auto& [number, stop] : network.stops()) {
-      const std::vector<CarriedMessage>& sent = middleware_.published[stop.name];
-      const auto first = std::ranges::find_if(
-          sent, [&](const CarriedMessage& message) { return number_in_message(message.data) == number; });
-      if (first == sent.end() || first->entity != stop.entity) continue;
+      const CarriedMessage first = first_sent(stop.name, number);
+      if (first.entity == 0 || first.entity != stop.entity) continue;
       findings_.count("outputs of stops");
       int others = 0;
       for (const std::string& name : kOut) {
-        if (name == stop.name) continue;
-        others += static_cast<int>(std::ranges::count_if(
-            middleware_.published[name], [&](const CarriedMessage& message) {
-              return message.order > stop.publishes && message.order < first->order &&
-                     !network.stops().contains(number_in_message(message.data));
-            }));
+        if (name == stop.name || has_stop_between(name, network, stop.publishes, first.order)) continue;
+        const std::vector<CarriedMessage>& sent = middleware_.published[name];
+        for (std::size_t i = 0; i < sent.size(); ++i) {
+          const bool is_copy = i > 0 && sent[i].data == sent[i - 1].data;
+          others += !is_copy && sent[i].order > stop.publishes && sent[i].order < first.order &&
+                    !network.stops().contains(number_in_message(sent[i].data));
+        }
       }
       expect(others <= 1, std::to_string(others) + " other messages are sent before the output of a stop, " +
                               text(number));

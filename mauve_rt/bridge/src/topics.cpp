@@ -18,13 +18,14 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kMessagesAtOnce = 64;                 // messages that one wait takes of a topic
+constexpr int kMessagesAtOnce = 64;  // messages that one wait takes of a topic
 // Of a stop's output on a best-effort topic, after its first message: a loss that lasts for some ms does not take them all.
 constexpr std::array kCopies{ms_to_ns(5), ms_to_ns(20)};
 // Of a reliable topic, while it is not acknowledged: only a message makes the middleware report soon what it has sent, else
 // listeners ask for a lost one seconds later. The first is later than an acknowledgement of a listener that has all (5 ms).
 constexpr std::array kRepairs{ms_to_ns(20), ms_to_ns(50), ms_to_ns(100), ms_to_ns(150)};
-constexpr time_ns_t kAcknowledged = ms_to_ns(200);  // the longest wait for all listeners to have a stop's output
+constexpr time_ns_t kAcknowledged =
+    ms_to_ns(200);  // the longest wait for all listeners to have a stop's output
 constexpr time_ns_t kExplainEvery = ms_to_ns(100);  // a flood of messages is not looked at one by one
 
 std::string described(const TopicSettings& settings) {
@@ -104,7 +105,8 @@ void OutgoingTopic::settle() {
   time_ns_t left_ns = 0;
   {
     const LockGuard lock(mutex_);
-    if (is_reliable_ && stopped_sent_ns_ != 0) left_ns = stopped_sent_ns_ + kAcknowledged - monotonic_now_ns();
+    if (is_reliable_ && stopped_sent_ns_ != 0)
+      left_ns = stopped_sent_ns_ + kAcknowledged - monotonic_now_ns();
   }
   if (left_ns > 0) is_acknowledged(left_ns);
 }

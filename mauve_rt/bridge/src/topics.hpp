@@ -86,8 +86,8 @@ class OutgoingTopic final : public BoundTopic {
   std::vector<std::byte> message_ MAUVE_GUARDED_BY(mutex_);  // these keep their capacity
   std::vector<std::byte> stopped_ MAUVE_GUARDED_BY(mutex_);  // the last that a stop has written
   std::uint64_t seen_ MAUVE_GUARDED_BY(mutex_){0};
-  Atomic<std::uint32_t> stops_{0};              // of the resource, as far as they are sent
-  Atomic<time_ns_t> copy_due_ns_{kForever};     // the next copy of stopped_
+  Atomic<std::uint32_t> stops_{0};           // of the resource, as far as they are sent
+  Atomic<time_ns_t> copy_due_ns_{kForever};  // the next copy of stopped_
   std::size_t copies_ MAUVE_GUARDED_BY(mutex_){0};
   time_ns_t stopped_sent_ns_ MAUVE_GUARDED_BY(mutex_){0};
   TopicEvents events_;  // end before the entity that they are of

@@ -84,7 +84,8 @@ TEST_P(EndSignal, MakesOutputsSafe) {
     const int signal = wait_end_signal();
     sender.join();
     const bool is_safe = robot.all_are(0.0) && !robot.deployer.is_deployed();
-    const bool is_marked = std::ranges::all_of(robot.outputs, [](auto* output) { return output->stops() == 1; });
+    const bool is_marked =
+        std::ranges::all_of(robot.outputs, [](auto* output) { return output->stops() == 1; });
     _exit(signal == GetParam() && is_safe && is_marked ? 0 : 3);
   };
   EXPECT_EXIT(live(), ExitedWithCode(0), "");

@@ -39,11 +39,12 @@ def await_safe(graph: Any, counts: list[Float64]) -> None:
     graph.spin_until(lambda: counts[-1].data == 0.0, "the type's zero, written at the stop")
 
 
-@pytest.mark.parametrize(("qos", "times"), [("best_effort", 3), ("reliable", 1)])
+@pytest.mark.parametrize("sent", [("best_effort", 3), ("reliable", 1)])
 @pytest.mark.parametrize("how", ["signal", "deactivate", "stop"])
 def test_the_output_of_a_stop_is_sent_three_times_where_a_message_may_be_lost(
-    qos: str, times: int, how: str, architecture: Path, start_executor: Callable[..., Any], graph: Any
+    sent: tuple[str, int], how: str, architecture: Path, start_executor: Callable[..., Any], graph: Any
 ) -> None:
+    qos, times = sent
     text = architecture.read_text(encoding="utf-8")
     published = "name: count, direction: publish"
     architecture.write_text(text.replace(published, f"{published}, qos: {qos}"), encoding="utf-8")

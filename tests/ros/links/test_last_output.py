@@ -1,4 +1,4 @@
-"""The last message that a listener on another machine gets of an executor that ends, over a cable that loses."""
+"""The last message that a listener on another machine gets of an executor that ends, over a lossy cable."""
 
 import json
 import os

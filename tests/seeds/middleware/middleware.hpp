@@ -83,7 +83,7 @@ class Middleware {
 
   std::map<std::string, std::vector<CarriedMessage>> published{};  // by topic
   std::map<std::string, std::vector<CarriedMessage>>
-      taken{};  // likewise, but by subscriptions that only report arrivals
+      taken{};                 // likewise, but by subscriptions that only report arrivals
   std::uint64_t publishes{0};  // that have begun
   std::vector<SentRequest> requests{};
   std::vector<SentResponse> responses{};
