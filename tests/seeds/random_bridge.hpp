@@ -308,34 +308,40 @@ class RandomBridge {
     }
     return {.entity = 0, .data = {}};
   }
-  /// Whether a topic had an output of a stop to send, with all that its resource holds before, in that time.
-  bool has_stop_between(const std::string& name, const BridgeNetwork& network, std::uint64_t from,
-                        std::uint64_t to) {
-    return std::ranges::any_of(network.stops(), [&](const auto& each) {
-      const auto& [number, stop] = each;
-      if (stop.name != name || stop.publishes > to) return false;
-      const CarriedMessage first = first_sent(name, number);
-      return first.entity == 0 || first.order > from;
-    });
-  }
-  /// The output of a stop goes before all others. One may have been taken from its resource already.
+  /// A topic with an output of a stop takes turns with others like it, message by message, and goes before all others: between
+  /// two of its messages the same thread sends of another topic one in its turn, and one in the place of a copy. Another
+  /// thread may be at one message of each topic; or be at the topic itself, so that the others go first.
   void check_stops(const BridgeNetwork& network) {
     for (const auto& [number, stop] : network.stops()) {
       const CarriedMessage first = first_sent(stop.name, number);
       if (first.entity == 0 || first.entity != stop.entity) continue;
       findings_.count("outputs of stops");
-      int others = 0;
-      for (const std::string& name : kOut) {
-        if (name == stop.name || has_stop_between(name, network, stop.publishes, first.order)) continue;
-        const std::vector<CarriedMessage>& sent = middleware_.published[name];
-        for (std::size_t i = 0; i < sent.size(); ++i) {
-          const bool is_copy = i > 0 && sent[i].data == sent[i - 1].data;
-          others += !is_copy && sent[i].order > stop.publishes && sent[i].order < first.order &&
-                    !network.stops().contains(number_in_message(sent[i].data));
-        }
+      std::uint64_t free_since = stop.publishes;
+      for (const CarriedMessage& message : middleware_.published[stop.name]) {
+        if (message.order > first.order) break;
+        if (message.order > stop.publishes) check_turns(network, stop.name, free_since, message);
+        free_since = std::max(free_since, message.ended);
       }
-      expect(others <= 1, std::to_string(others) + " other messages are sent before the output of a stop, " +
-                              text(number));
+    }
+  }
+  void check_turns(const BridgeNetwork& network, const std::string& stopped, std::uint64_t after,
+                   const CarriedMessage& before) {
+    for (const std::string& name : kOut) {
+      if (name == stopped) continue;
+      const bool has_turns = std::ranges::any_of(network.stops(), [&](const auto& each) {
+        return each.second.name == name && each.second.publishes <= before.order;
+      });
+      const std::vector<CarriedMessage>& sent = middleware_.published[name];
+      int own = 0;
+      int others = 0;
+      for (std::size_t i = 0; i < sent.size(); ++i) {
+        const bool is_copy = i > 0 && sent[i].data == sent[i - 1].data;
+        if (is_copy || sent[i].order <= after || sent[i].order >= before.order) continue;
+        ++(sent[i].thread == before.thread ? own : others);
+      }
+      expect(own <= 2 && (has_turns || others <= 1),
+             name + " sends " + std::to_string(own) + " and " + std::to_string(others) + " messages, and " +
+                 stopped + " has the output of a stop to send, message " + std::to_string(before.order));
     }
   }
 

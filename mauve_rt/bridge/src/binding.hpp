@@ -86,11 +86,14 @@ class Binding {
   }
   /// Sends one thing that its resource has for the outside, the oldest; true when there may be more. [non-rt]
   virtual bool send() { return false; }
-  /// Sends the outputs that a stop has written, and copies of them that are due; returns when the next copy is due. Unless
-  /// it `may_wait`, it does nothing while another thread sends here. [non-rt] In parallel with send().
+  /// What send_stops() returns while it has more to send.
+  static constexpr time_ns_t kAtOnce = 0;
+  /// Sends one thing, the oldest, if a stop has written since all was sent; else a copy of a stop's output that is due.
+  /// Returns when to call it again. Unless it `may_wait`, it does nothing while another thread sends here. [non-rt]
+  /// In parallel with send().
   virtual time_ns_t send_stops(bool /*may_wait*/) { return kForever; }
-  /// Returns when what a stop has written is sent, with all copies, and is acknowledged, if only in time. [non-rt]
-  virtual void settle() {}
+  /// Returns when listeners have acknowledged the outputs of a stop that were sent, if only in time. [non-rt]
+  virtual void await_acknowledged() {}
   /// When the sending thread is to call send() at the latest, though nothing was written. [non-rt]
   virtual time_ns_t next_look_ns() const { return kForever; }
   /// What its receivers wait for. [non-rt]

@@ -5,6 +5,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/seam/guards.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "thread.hpp"
@@ -82,9 +83,11 @@ void Bridge::listen_for_silence(std::set<std::string> resources) {
 void Bridge::close(const std::vector<std::size_t>& numbers) {
   while (send_some()) {
   }
+  for (time_ns_t due_ns = 0; (due_ns = send_stops()) != kForever;)
+    sleep_for(std::max(due_ns - monotonic_now_ns(), time_ns_t{0}));
   for (const std::size_t number : numbers) {  // no other thread opens or closes one now
-    if (const auto found = bindings_.find(number); found != bindings_.end() && found->second->is_attached())
-      found->second->settle();
+    if (const auto found = bindings_.find(number); found != bindings_.end())
+      found->second->await_acknowledged();
   }
   stop_receivers();
   {
@@ -118,9 +121,7 @@ void Bridge::stop() {
   stops_ending_.store(true, std::memory_order_release);
   architecture_.stops().notify();
   stops_sender_.join();
-  for (const auto& [number, binding] : bindings_) {
-    if (binding->is_attached()) binding->settle();
-  }
+  for (const auto& [number, binding] : bindings_) binding->await_acknowledged();
 }
 
 void Bridge::close() {
@@ -159,13 +160,17 @@ bool Bridge::has_stops() noexcept {
 /// Returns when the next copy is due.
 time_ns_t Bridge::send_stops() {
   const LockGuard lock(stops_mutex_);
-  const std::uint32_t word = architecture_.stops().word();  // before the look: what comes after is noticed
-  // First those on which no other thread is sending: that may last.
-  for (Binding* const binding : stoppable_) binding->send_stops(false);
-  time_ns_t next_ns = kForever;
-  for (Binding* const binding : stoppable_) next_ns = std::min(next_ns, binding->send_stops(true));
-  stops_sent_.store(word, std::memory_order_relaxed);
-  return next_ns;
+  // The topics take turns, message by message. Those on which another thread is sending come last: that may take long.
+  for (bool may_wait = false;;) {
+    const std::uint32_t word = architecture_.stops().word();  // before the look: what comes after is noticed
+    time_ns_t next_ns = kForever;
+    for (Binding* const binding : stoppable_) next_ns = std::min(next_ns, binding->send_stops(may_wait));
+    if (may_wait && next_ns != Binding::kAtOnce) {
+      stops_sent_.store(word, std::memory_order_relaxed);
+      return next_ns;
+    }
+    may_wait = next_ns != Binding::kAtOnce;
+  }
 }
 
 /// mutex_ held, too.

@@ -8,7 +8,6 @@
 #include <span>
 
 #include "mauve_rt/base/seam/guards.hpp"
-#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "rcl_error.hpp"
@@ -90,8 +89,7 @@ time_ns_t OutgoingTopic::send_stops(bool may_wait) {
   const LockGuard lock(mutex_, std::adopt_lock);
   const std::uint32_t stops = resource().stops();  // before the samples: a later one is noticed
   if (stops != stops_.load(std::memory_order_relaxed)) {
-    while (send_next()) {
-    }
+    if (send_next()) return kAtOnce;
     stops_.store(stops, std::memory_order_relaxed);
   }
   const time_ns_t now_ns = monotonic_now_ns();
@@ -99,9 +97,7 @@ time_ns_t OutgoingTopic::send_stops(bool may_wait) {
   return copy_due_ns_.load(std::memory_order_relaxed);
 }
 
-void OutgoingTopic::settle() {
-  for (time_ns_t due_ns = 0; (due_ns = send_stops(true)) != kForever;)
-    sleep_for(std::max(due_ns - monotonic_now_ns(), time_ns_t{0}));
+void OutgoingTopic::await_acknowledged() {
   time_ns_t left_ns = 0;
   {
     const LockGuard lock(mutex_);

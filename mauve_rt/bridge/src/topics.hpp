@@ -56,7 +56,7 @@ class BoundTopic : public Binding {
 };
 
 /// Publishes what is written to a resource. The outputs that a stop writes are sent again until something newer is sent: by a
-/// publisher that is best effort twice, by a reliable one while they are not acknowledged, which settle() waits for.
+/// publisher that is best effort twice, by a reliable one while they are not acknowledged, which await_acknowledged() waits for.
 ///
 /// | member            | written by    | read by                       | under / order                                  |
 /// | ----------------- | ------------- | ----------------------------- | ---------------------------------------------- |
@@ -69,7 +69,7 @@ class OutgoingTopic final : public BoundTopic {
 
   bool send() override;
   time_ns_t send_stops(bool may_wait) override;
-  void settle() override;
+  void await_acknowledged() override;
 
  private:
   bool send_next() MAUVE_REQUIRES(mutex_);

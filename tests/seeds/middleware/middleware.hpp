@@ -2,6 +2,8 @@
 // Middleware: what is behind the simulated rcl. It delivers messages in virtual time, and loses, refuses and fails as the seed wants.
 #pragma once
 
+#include <pthread.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -38,6 +40,8 @@ struct CarriedMessage {
   Bytes data;
   bool is_sent{true};
   std::uint64_t order{0};  // in which all messages began to be published
+  std::uint64_t ended{0};  // so many had begun when this one ended
+  pthread_t thread{};      // that published it
 };
 /// A message that waits for the bridge.
 struct WaitingMessage {

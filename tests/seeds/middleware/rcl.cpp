@@ -142,8 +142,12 @@ rcl_ret_t rcl_publish_serialized_message(const rcl_publisher_t* publisher,
   here().pass(us_to_ns(10));
   --entity->users;
   const bool is_sent = !here().fails(here().failures.publish);
-  here().published[entity->name].push_back(
-      {.entity = publisher->number, .data = bytes_of(*message), .is_sent = is_sent, .order = order});
+  here().published[entity->name].push_back({.entity = publisher->number,
+                                            .data = bytes_of(*message),
+                                            .is_sent = is_sent,
+                                            .order = order,
+                                            .ended = here().publishes,
+                                            .thread = pthread_self()});
   return is_sent ? RCL_RET_OK : RCL_RET_ERROR;
 }
 
