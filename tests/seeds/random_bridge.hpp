@@ -296,7 +296,7 @@ class RandomBridge {
       if (stop == network.stops().end() || stop->second.entity != entity) continue;
       const auto times = std::ranges::count(numbers, numbers.back());
       findings_.count("last outputs of stops");
-      expect(are_reliable_[name] ? times >= 1 && times <= 5 : times == 3,
+      expect(are_reliable_[name] ? times >= 1 && times <= 21 : times == 3,
              name + " sends the output of a stop, " + text(numbers.back()) + ", " + std::to_string(times) +
                  " times");
     }

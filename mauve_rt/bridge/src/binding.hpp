@@ -92,8 +92,6 @@ class Binding {
   /// Returns when to call it again. Unless it `may_wait`, it does nothing while another thread sends here. [non-rt]
   /// In parallel with send().
   virtual time_ns_t send_stops(bool /*may_wait*/) { return kForever; }
-  /// Returns when listeners have acknowledged the outputs of a stop that were sent, if only in time. [non-rt]
-  virtual void await_acknowledged() {}
   /// When the sending thread is to call send() at the latest, though nothing was written. [non-rt]
   virtual time_ns_t next_look_ns() const { return kForever; }
   /// What its receivers wait for. [non-rt]

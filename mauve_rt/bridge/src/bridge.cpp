@@ -85,10 +85,6 @@ void Bridge::close(const std::vector<std::size_t>& numbers) {
   }
   for (time_ns_t due_ns = 0; (due_ns = send_stops()) != kForever;)
     sleep_for(std::max(due_ns - monotonic_now_ns(), time_ns_t{0}));
-  for (const std::size_t number : numbers) {  // no other thread opens or closes one now
-    if (const auto found = bindings_.find(number); found != bindings_.end())
-      found->second->await_acknowledged();
-  }
   stop_receivers();
   {
     const LockGuard lock(mutex_);
@@ -121,7 +117,6 @@ void Bridge::stop() {
   stops_ending_.store(true, std::memory_order_release);
   architecture_.stops().notify();
   stops_sender_.join();
-  for (const auto& [number, binding] : bindings_) binding->await_acknowledged();
 }
 
 void Bridge::close() {

@@ -57,13 +57,13 @@ class Bridge {
   void attach(const std::vector<std::size_t>& numbers);
   /// Rules listen for the silence of these resources, and of no others. [non-rt] Throws Error when rcl refuses.
   void listen_for_silence(std::set<std::string> resources);
-  /// These end; what was written before is sent, and outputs of stops are acknowledged as by stop(). [non-rt]
+  /// These end when what was written before is sent, with copies of the outputs of stops. [non-rt]
   void close(const std::vector<std::size_t>& numbers);
 
   /// Lets messages and calls flow, both ways. [non-rt]
   void start();
-  /// Ends the flow when what was written before is sent. Listeners have 200 ms to acknowledge the outputs of a stop that are
-  /// reliable. May be called again. [non-rt]
+  /// Ends the flow when what was written before is sent, with copies of the outputs of stops (up to 200 ms). May be called
+  /// again. [non-rt]
   void stop();
   /// stop(), and all bindings end. [non-rt]
   void close();

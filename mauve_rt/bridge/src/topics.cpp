@@ -21,10 +21,9 @@ constexpr int kMessagesAtOnce = 64;  // messages that one wait takes of a topic
 // Of a stop's output on a best-effort topic, after its first message: a loss that lasts for some ms does not take them all.
 constexpr std::array kCopies{ms_to_ns(5), ms_to_ns(20)};
 // Of a reliable topic, while it is not acknowledged: only a message makes the middleware report soon what it has sent, else
-// listeners ask for a lost one seconds later. The first is later than an acknowledgement of a listener that has all (5 ms).
-constexpr std::array kRepairs{ms_to_ns(20), ms_to_ns(50), ms_to_ns(100), ms_to_ns(150)};
-constexpr time_ns_t kAcknowledged =
-    ms_to_ns(200);  // the longest wait for all listeners to have a stop's output
+// listeners ask for a lost one seconds later. So long takes an acknowledgement; and as often as a bad cable needs.
+constexpr time_ns_t kRepairEvery = ms_to_ns(10);
+constexpr std::size_t kRepairs = 20;
 constexpr time_ns_t kExplainEvery = ms_to_ns(100);  // a flood of messages is not looked at one by one
 
 std::string described(const TopicSettings& settings) {
@@ -92,30 +91,14 @@ time_ns_t OutgoingTopic::send_stops(bool may_wait) {
     if (send_next()) return kAtOnce;
     stops_.store(stops, std::memory_order_relaxed);
   }
-  const time_ns_t now_ns = monotonic_now_ns();
-  if (copy_due_ns_.load(std::memory_order_relaxed) <= now_ns && !send_next()) repeat(now_ns);
+  if (copy_due_ns_.load(std::memory_order_relaxed) <= monotonic_now_ns() && !send_next()) repeat();
   return copy_due_ns_.load(std::memory_order_relaxed);
 }
 
-void OutgoingTopic::await_acknowledged() {
-  time_ns_t left_ns = 0;
-  {
-    const LockGuard lock(mutex_);
-    if (is_reliable_ && stopped_sent_ns_ != 0)
-      left_ns = stopped_sent_ns_ + kAcknowledged - monotonic_now_ns();
-  }
-  if (left_ns > 0) is_acknowledged(left_ns);
-}
-
-/// Whether all listeners have all messages, within the time.
-bool OutgoingTopic::is_acknowledged(time_ns_t timeout_ns) const {
-  return went_well(rcl_publisher_wait_for_all_acked(publisher_.get(), timeout_ns));
-}
-
-/// When copies of a stop's output are sent, after its first message.
-std::span<const time_ns_t> OutgoingTopic::copy_times() const noexcept {
-  if (is_reliable_) return kRepairs;
-  return kCopies;
+/// How long after the first message of a stop's output the next copy is due; kForever: there is none.
+time_ns_t OutgoingTopic::copy_after_ns() const {
+  if (is_reliable_) return copies_ < kRepairs ? static_cast<time_ns_t>(copies_ + 1) * kRepairEvery : kForever;
+  return copies_ < kCopies.size() ? kCopies[copies_] : kForever;
 }
 
 /// Whether there was one.
@@ -128,21 +111,19 @@ bool OutgoingTopic::send_next() {
   message_.swap(stopped_);
   stopped_sent_ns_ = monotonic_now_ns();
   copies_ = 0;
-  copy_due_ns_.store(stopped_sent_ns_ + copy_times().front(), std::memory_order_relaxed);
+  copy_due_ns_.store(stopped_sent_ns_ + copy_after_ns(), std::memory_order_relaxed);
   return true;
 }
 
-void OutgoingTopic::repeat(time_ns_t now_ns) {
-  const std::span<const time_ns_t> times = copy_times();
-  if (is_reliable_ && is_acknowledged(0)) {
-    copies_ = times.size();
-  } else {
+/// Unless all listeners have it.
+void OutgoingTopic::repeat() {
+  time_ns_t after_ns = kForever;
+  if (!is_reliable_ || !went_well(rcl_publisher_wait_for_all_acked(publisher_.get(), 0))) {
     publish(stopped_);
     ++copies_;
+    after_ns = copy_after_ns();
   }
-  const bool is_last = copies_ == times.size();
-  copy_due_ns_.store(is_last ? kForever : std::max(stopped_sent_ns_ + times[copies_], now_ns),
-                     std::memory_order_relaxed);
+  copy_due_ns_.store(after_ns == kForever ? kForever : stopped_sent_ns_ + after_ns, std::memory_order_relaxed);
 }
 
 void OutgoingTopic::publish(std::vector<std::byte>& message) {

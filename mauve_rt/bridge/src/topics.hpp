@@ -56,7 +56,7 @@ class BoundTopic : public Binding {
 };
 
 /// Publishes what is written to a resource. The outputs that a stop writes are sent again until something newer is sent: by a
-/// publisher that is best effort twice, by a reliable one while they are not acknowledged, which await_acknowledged() waits for.
+/// publisher that is best effort twice, by a reliable one while they are not acknowledged.
 ///
 /// | member            | written by    | read by                       | under / order                                  |
 /// | ----------------- | ------------- | ----------------------------- | ---------------------------------------------- |
@@ -69,14 +69,12 @@ class OutgoingTopic final : public BoundTopic {
 
   bool send() override;
   time_ns_t send_stops(bool may_wait) override;
-  void await_acknowledged() override;
 
  private:
   bool send_next() MAUVE_REQUIRES(mutex_);
   void publish(std::vector<std::byte>& message) MAUVE_REQUIRES(mutex_);
-  void repeat(time_ns_t now_ns) MAUVE_REQUIRES(mutex_);
-  bool is_acknowledged(time_ns_t timeout_ns) const;
-  std::span<const time_ns_t> copy_times() const noexcept;
+  void repeat() MAUVE_REQUIRES(mutex_);
+  time_ns_t copy_after_ns() const MAUVE_REQUIRES(mutex_);
   std::string full_name() const override { return rcl_publisher_get_topic_name(publisher_.get()); }
   const TopicEvents& events() const override { return events_; }
 
