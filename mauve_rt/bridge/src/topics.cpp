@@ -123,7 +123,8 @@ void OutgoingTopic::repeat() {
     ++copies_;
     after_ns = copy_after_ns();
   }
-  copy_due_ns_.store(after_ns == kForever ? kForever : stopped_sent_ns_ + after_ns, std::memory_order_relaxed);
+  copy_due_ns_.store(after_ns == kForever ? kForever : stopped_sent_ns_ + after_ns,
+                     std::memory_order_relaxed);
 }
 
 void OutgoingTopic::publish(std::vector<std::byte>& message) {
