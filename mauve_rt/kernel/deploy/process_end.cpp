@@ -117,7 +117,7 @@ void block_end_signals() noexcept {
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
 }
 
-int wait_end_signal(const EndOptions& options) noexcept {
+int wait_end_signal(const EndOptions& options) {
   Reserve reserve;
   auto* const ending = new Ending(options);  // its threads outlive this call
   const int signal = await_signal(end_signals());

@@ -24,6 +24,7 @@ void block_end_signals() noexcept;
 /// Sleeps until one of the signals comes. Then shuts down every deployer of the process, for good (Deployer::end()): outputs
 /// are safe on return. Waits for no other thread but for the components' own, and takes no lock of Python. Threads and memory
 /// for the end are there before the signal: a process that gets no more of either ends the same way. Returns the signal. [non-rt]
-int wait_end_signal(const EndOptions& options = {}) noexcept;
+/// Throws std::bad_alloc or std::system_error, before it sleeps: the system gives too little of them already.
+int wait_end_signal(const EndOptions& options = {});
 
 }  // namespace mauve
