@@ -59,7 +59,7 @@ class SerializedWritePort final : public PortBase {
     if (service_ == nullptr || is_closed() || is_previewed()) return true;
     const bool taken = service_->write(message, stamp_ns());
     // Closed in between: the zeros stay last, whoever wrote first.
-    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    if (keeps_zero()) write_stopped(stamp_ns());
     return taken;
   }
 

@@ -1,7 +1,10 @@
 """Cores in Python for the executor's tests."""
 
 import ctypes
+import errno
 import os
+import signal
+import struct
 import tempfile
 import threading
 import time
@@ -164,6 +167,19 @@ class PyKeeping(PyCounter):
         super().act()
 
 
+class PyForbidding(PyCounter):
+    """Ends the process by a signal, as a file says, once the system gives it neither a thread nor memory."""
+
+    def act(self) -> None:
+        """Count once, or forbid both (seccomp, all threads) and send the signal."""
+        awaited = Path(tempfile.gettempdir()) / f"mauve_forbidding_{os.getpid()}"
+        if awaited.exists():
+            awaited.unlink()
+            _forbid_threads_and_memory()
+            os.kill(os.getpid(), signal.SIGTERM)
+        super().act()
+
+
 class PyPausing(PyCounter):
     """Stays in its state while there is a file that its label names."""
 
@@ -173,3 +189,22 @@ class PyPausing(PyCounter):
         while Path(self.shell.label.value).exists() and time.monotonic() < until_s:
             time.sleep(0.002)
         super().act()
+
+
+def _forbid_threads_and_memory() -> None:
+    seccomp, calls = {
+        "x86_64": (317, (56, 435, 9, 12)),  # clone, clone3, mmap, brk
+        "aarch64": (277, (220, 435, 222, 214)),
+    }[os.uname().machine]
+    load_call, jump_if_equal, give = 0x20, 0x15, 0x06
+    allow, refuse = 0x7FFF0000, 0x00050000 | errno.EAGAIN
+    steps = [(load_call, 0, 0, 0)]
+    for call in calls:
+        steps += [(jump_if_equal, 0, 1, call), (give, 0, 0, refuse)]
+    steps.append((give, 0, 0, allow))
+    program = ctypes.create_string_buffer(b"".join(struct.pack("=HBBI", *step) for step in steps))
+    filter_ = struct.pack("@HP", len(steps), ctypes.addressof(program))
+    libc = ctypes.CDLL(None, use_errno=True)
+    no_new_privileges, filter_mode, all_threads = 38, 1, 1
+    if libc.prctl(no_new_privileges, 1, 0, 0, 0) or libc.syscall(seccomp, filter_mode, all_threads, filter_):
+        raise OSError(ctypes.get_errno(), "no filter of system calls")

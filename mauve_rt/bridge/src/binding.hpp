@@ -87,8 +87,14 @@ class Binding {
     MAUVE_EXPECTS(resource != nullptr);
     resource_ = std::move(resource);
   }
-  /// Sends what its resource has for the outside, oldest first; true when there may be more. [non-rt]
+  /// Sends one thing that its resource has for the outside, the oldest; true when there may be more. [non-rt]
   virtual bool send() { return false; }
+  /// What send_stops() returns while it has more to send.
+  static constexpr time_ns_t kAtOnce = 0;
+  /// Sends one thing, the oldest, if a stop has written since all was sent; else a copy of a stop's output that is due.
+  /// Returns when to call it again. Unless it `may_wait`, it does nothing while another thread sends here. [non-rt]
+  /// In parallel with send().
+  virtual time_ns_t send_stops(bool /*may_wait*/) { return kForever; }
   /// When the sending thread is to call send() at the latest, though nothing was written. [non-rt]
   virtual time_ns_t next_look_ns() const { return kForever; }
   /// What its receivers wait for. [non-rt]

@@ -5,6 +5,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/seam/guards.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "thread.hpp"
@@ -14,6 +15,8 @@ namespace mauve::bridge {
 namespace {
 
 constexpr time_ns_t kLook = s_to_ns(1);  // so often the sending thread looks even when nobody wakes it
+constexpr int kSentAtOnce = 64;          // of one binding before the others have their turn
+constexpr int kHighestPriority = 99;
 
 }  // namespace
 
@@ -51,12 +54,15 @@ void Bridge::attach(const std::vector<std::size_t>& numbers) {
       binding.attach(architecture_.hold_resource(binding.resource_name()));
       binding.listen_for_silence(silence_of(binding));
     }
+    const LockGuard stops(stops_mutex_);
+    list_stoppable();
   } catch (...) {
     start_receivers();
     throw;
   }
   start_receivers();
   architecture_.publications().notify();  // of what was written before
+  architecture_.stops().notify();
 }
 
 Silence Bridge::silence_of(const Binding& binding) const {
@@ -84,10 +90,14 @@ void Bridge::listen_for_silence(std::set<std::string> resources, std::set<std::s
 void Bridge::close(const std::vector<std::size_t>& numbers) {
   while (send_some()) {
   }
+  for (time_ns_t due_ns = 0; (due_ns = send_stops()) != kForever;)
+    sleep_for(std::max(due_ns - monotonic_now_ns(), time_ns_t{0}));
   stop_receivers();
   {
     const LockGuard lock(mutex_);
+    const LockGuard stops(stops_mutex_);
     for (const std::size_t number : numbers) bindings_.erase(number);
+    list_stoppable();
   }
   start_receivers();
 }
@@ -96,7 +106,11 @@ void Bridge::start() {
   if (running_) return;
   running_ = true;
   ending_.store(false, std::memory_order_release);
+  stops_ending_.store(false, std::memory_order_release);
   sender_ = start_thread("topics_out", [this] { send_all(); }, sender_place_);
+  ThreadPlace stops_place = sender_place_;
+  stops_place.priority = std::min(stops_place.priority + 1, kHighestPriority);
+  stops_sender_ = start_thread("stops_out", [this] { send_all_stops(); }, stops_place);
   start_receivers();
 }
 
@@ -107,12 +121,17 @@ void Bridge::stop() {
   ending_.store(true, std::memory_order_release);
   architecture_.publications().notify();
   sender_.join();
+  stops_ending_.store(true, std::memory_order_release);
+  architecture_.stops().notify();
+  stops_sender_.join();
 }
 
 void Bridge::close() {
   stop();
   const LockGuard lock(mutex_);
+  const LockGuard stops(stops_mutex_);
   bindings_.clear();
+  list_stoppable();
 }
 
 BridgeReport Bridge::report() {
@@ -125,8 +144,43 @@ BridgeReport Bridge::report() {
 bool Bridge::send_some() {
   const LockGuard lock(mutex_);
   bool more = false;
-  for (const auto& [number, binding] : bindings_) more = (binding->is_attached() && binding->send()) || more;
+  for (const auto& [number, binding] : bindings_) {
+    bool has_more = binding->is_attached();
+    for (int sent = 0; has_more && sent < kSentAtOnce; ++sent) {
+      if (has_stops()) send_stops();
+      has_more = binding->send();
+    }
+    more = more || has_more;
+  }
   return more;
+}
+
+bool Bridge::has_stops() noexcept {
+  return architecture_.stops().word() != stops_sent_.load(std::memory_order_relaxed);
+}
+
+/// Returns when the next copy is due.
+time_ns_t Bridge::send_stops() {
+  const LockGuard lock(stops_mutex_);
+  // The topics take turns, message by message. Those on which another thread is sending come last: that may take long.
+  for (bool may_wait = false;;) {
+    const std::uint32_t word = architecture_.stops().word();  // before the look: what comes after is noticed
+    time_ns_t next_ns = kForever;
+    for (Binding* const binding : stoppable_) next_ns = std::min(next_ns, binding->send_stops(may_wait));
+    if (may_wait && next_ns != Binding::kAtOnce) {
+      stops_sent_.store(word, std::memory_order_relaxed);
+      return next_ns;
+    }
+    may_wait = next_ns != Binding::kAtOnce;
+  }
+}
+
+/// mutex_ held, too.
+void Bridge::list_stoppable() {
+  stoppable_.clear();
+  for (const auto& [number, binding] : bindings_) {
+    if (binding->is_attached()) stoppable_.push_back(binding.get());
+  }
 }
 
 time_ns_t Bridge::next_look_ns() {
@@ -147,6 +201,17 @@ void Bridge::send_all() {
     while (send_some()) {
     }
     if (!ending) written.wait(word, next_look_ns());
+  }
+}
+
+void Bridge::send_all_stops() {
+  Notifier& stops = architecture_.stops();
+  for (;;) {
+    const std::uint32_t word = stops.word();
+    const bool ending = stops_ending_.load(std::memory_order_acquire);
+    const time_ns_t next_ns = send_stops();
+    if (ending && next_ns == kForever) return;
+    stops.wait(word, next_ns);
   }
 }
 

@@ -19,18 +19,22 @@
 
 namespace mauve::bridge {
 
-/// Opens, serves and closes bindings. One thread sends, one takes messages and answers, one takes requests, one hears of
-/// deadlines and the like.
+/// Opens, serves and closes bindings. One thread sends, one sends the outputs of stops before all others, one takes messages
+/// and answers, one takes requests, one receives events such as missed deadlines.
 ///
 /// | member      | written by                   | read by                        | under / order                    |
 /// | ----------- | ---------------------------- | ------------------------------ | -------------------------------- |
 /// | bindings_   | publish() ... close()        | the sending thread, report()   | mutex_; receivers are stopped    |
+/// | stoppable_  | attach(), close()            | who sends the outputs of stops | stops_mutex_, after mutex_       |
+/// | stops_sent_ | send_stops()                 | the sending thread             | stops_mutex_; relaxed: only says whether to take it |
 /// | ending_     | stop()                       | the sending thread             | release/acquire                  |
+/// | stops_ending_ | stop()                     | the thread that sends outputs of stops | release/acquire          |
 /// | the others  | one ordinary thread at a time, which the caller sees to      | -                                |
 class Bridge {
  public:
   /// The node and the architecture outlive the bridge. Throws Error when rcl refuses. [non-rt]
   /// The sending thread is real-time: an ordinary one of a busy machine comes when the newest value is replaced already.
+  /// Outputs of stops have a priority that is higher by one.
   Bridge(rcl_node_t& node, Architecture& architecture, ThreadPlace sender = {})
       : node_(node), architecture_(architecture), sender_place_(std::move(sender)) {}
   ~Bridge();
@@ -54,12 +58,13 @@ class Bridge {
   /// Rules listen for the silence of these resources, and of the links that those are bound to, and of no others. [non-rt]
   /// Throws Error when rcl refuses.
   void listen_for_silence(std::set<std::string> resources, std::set<std::string> links);
-  /// These end; what was written before is sent. [non-rt]
+  /// These end when what was written before is sent, with copies of the outputs of stops. [non-rt]
   void close(const std::vector<std::size_t>& numbers);
 
   /// Lets messages and calls flow, both ways. [non-rt]
   void start();
-  /// Ends the flow when what was written before is sent. May be called again. [non-rt]
+  /// Ends the flow when what was written before is sent, with copies of the outputs of stops (up to 200 ms). May be called
+  /// again. [non-rt]
   void stop();
   /// stop(), and all bindings end. [non-rt]
   void close();
@@ -73,8 +78,12 @@ class Bridge {
   std::size_t open(const Args&... args);
   Silence silence_of(const Binding& binding) const;
   bool send_some();
+  bool has_stops() noexcept;
+  time_ns_t send_stops();
+  void list_stoppable() MAUVE_REQUIRES(stops_mutex_);
   time_ns_t next_look_ns();
   void send_all();
+  void send_all_stops();
   void start_receivers();
   void stop_receivers();
 
@@ -84,6 +93,9 @@ class Bridge {
   TopicLog log_;
   PiMutex mutex_;
   std::map<std::size_t, std::unique_ptr<Binding>> bindings_;
+  PiMutex stops_mutex_;  // never held while anything else is sent
+  std::vector<Binding*> stoppable_ MAUVE_GUARDED_BY(stops_mutex_);
+  Atomic<std::uint32_t> stops_sent_{0};  // the word of the architecture's stops(), as far as they are sent
   std::size_t opened_{0};
   std::set<std::string> silent_;  // resources whose silence rules listen for
   std::set<std::string> links_;   // those of which they listen for the silence of the link
@@ -92,7 +104,9 @@ class Bridge {
   Receiver events_{node_, "topic_events"};   // few, so that waiting for messages stays cheap
   bool running_{false};
   Atomic<bool> ending_{false};
+  Atomic<bool> stops_ending_{false};
   WorkerThread sender_;
+  WorkerThread stops_sender_;
 };
 
 }  // namespace mauve::bridge

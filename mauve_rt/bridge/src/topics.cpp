@@ -3,6 +3,11 @@
 
 #include <rcl/error_handling.h>
 
+#include <algorithm>
+#include <array>
+#include <span>
+
+#include "mauve_rt/base/seam/guards.hpp"
 #include "mauve_rt/base/time.hpp"
 
 #include "rcl_error.hpp"
@@ -12,7 +17,13 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kMessagesAtOnce = 64;                 // messages of one topic before the others have their turn
+constexpr int kMessagesAtOnce = 64;  // messages that one wait takes of a topic
+// Of a stop's output on a best-effort topic, after its first message: a loss that lasts for some ms does not take them all.
+constexpr std::array kCopies{ms_to_ns(5), ms_to_ns(20)};
+// Of a reliable topic, while it is not acknowledged: only a message makes the middleware report soon what it has sent, else
+// listeners ask for a lost one seconds later. So long takes an acknowledgement; and as often as a bad cable needs.
+constexpr time_ns_t kRepairEvery = ms_to_ns(10);
+constexpr std::size_t kRepairs = 20;
 constexpr time_ns_t kExplainEvery = ms_to_ns(100);  // a flood of messages is not looked at one by one
 
 std::string described(const TopicSettings& settings) {
@@ -55,19 +66,72 @@ OutgoingTopic::OutgoingTopic(rcl_node_t& node, const TopicSettings& settings, st
   check(rcl_publisher_init(publisher_.get(), &node, &message_type_support(settings.type),
                            settings.name.c_str(), &options),
         "the topic cannot be published", described(settings));
+  const rmw_qos_profile_t* const actual = rcl_publisher_get_actual_qos(publisher_.get());
+  is_reliable_ = actual != nullptr && actual->reliability == RMW_QOS_POLICY_RELIABILITY_RELIABLE;
   events_.open(*publisher_.get(), settings.qos);
 }
 
 bool OutgoingTopic::send() {
-  time_ns_t time_ns = 0;
-  for (int sent = 0; sent < kMessagesAtOnce; ++sent) {
-    if (!resource().next_sample(message_, time_ns, seen_)) return false;
-    // Sent from where it lies: rcl only reads it.
-    const rcl_serialized_message_t serialized = borrowed(message_);
-    const bool passed = went_well(rcl_publish_serialized_message(publisher_.get(), &serialized, nullptr));
-    count(passed, monotonic_now_ns(), message_);
+  const LockGuard lock(mutex_);
+  return send_next();
+}
+
+time_ns_t OutgoingTopic::send_stops(bool may_wait) {
+  const time_ns_t due_ns = copy_due_ns_.load(std::memory_order_relaxed);
+  if (resource().stops() == stops_.load(std::memory_order_relaxed) && monotonic_now_ns() < due_ns)
+    return due_ns;
+  if (may_wait) {
+    mutex_.lock();
+  } else if (!mutex_.try_lock()) {
+    return kForever;
   }
+  const LockGuard lock(mutex_, std::adopt_lock);
+  const std::uint32_t stops = resource().stops();  // before the samples: a later one is noticed
+  if (stops != stops_.load(std::memory_order_relaxed)) {
+    if (send_next()) return kAtOnce;
+    stops_.store(stops, std::memory_order_relaxed);
+  }
+  if (copy_due_ns_.load(std::memory_order_relaxed) <= monotonic_now_ns() && !send_next()) repeat();
+  return copy_due_ns_.load(std::memory_order_relaxed);
+}
+
+/// How long after the first message of a stop's output the next copy is due; kForever: there is none.
+time_ns_t OutgoingTopic::copy_after_ns() const {
+  if (is_reliable_) return copies_ < kRepairs ? static_cast<time_ns_t>(copies_ + 1) * kRepairEvery : kForever;
+  return copies_ < kCopies.size() ? kCopies[copies_] : kForever;
+}
+
+/// Whether there was one.
+bool OutgoingTopic::send_next() {
+  time_ns_t time_ns = 0;
+  if (!resource().next_sample(message_, time_ns, seen_)) return false;
+  publish(message_);
+  copy_due_ns_.store(kForever, std::memory_order_relaxed);
+  if (time_ns > resource().stop_ns()) return true;
+  message_.swap(stopped_);
+  stopped_sent_ns_ = monotonic_now_ns();
+  copies_ = 0;
+  copy_due_ns_.store(stopped_sent_ns_ + copy_after_ns(), std::memory_order_relaxed);
   return true;
+}
+
+/// Unless all listeners have it.
+void OutgoingTopic::repeat() {
+  time_ns_t after_ns = kForever;
+  if (!is_reliable_ || !went_well(rcl_publisher_wait_for_all_acked(publisher_.get(), 0))) {
+    publish(stopped_);
+    ++copies_;
+    after_ns = copy_after_ns();
+  }
+  copy_due_ns_.store(after_ns == kForever ? kForever : stopped_sent_ns_ + after_ns,
+                     std::memory_order_relaxed);
+}
+
+void OutgoingTopic::publish(std::vector<std::byte>& message) {
+  // Sent from where it lies: rcl only reads it.
+  const rcl_serialized_message_t serialized = borrowed(message);
+  const bool passed = went_well(rcl_publish_serialized_message(publisher_.get(), &serialized, nullptr));
+  count(passed, monotonic_now_ns(), message);
 }
 
 ArrivalTwin::ArrivalTwin(rcl_node_t& node, const TopicSettings& settings, const Arrival& messages,

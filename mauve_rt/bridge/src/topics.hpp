@@ -6,8 +6,11 @@
 #include <rcl/subscription.h>
 
 #include <memory>
+#include <span>
 #include <string>
 
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 
 #include "binding.hpp"
@@ -52,21 +55,39 @@ class BoundTopic : public Binding {
   std::string refusal_ MAUVE_GUARDED_BY(refusal_mutex_);  // that thread writes it, others look
 };
 
-/// Publishes what is written to a resource. For one thread at a time.
+/// Publishes what is written to a resource. The outputs that a stop writes are sent again until something newer is sent: by a
+/// publisher that is best effort twice, by a reliable one while they are not acknowledged.
+///
+/// | member            | written by    | read by                       | under / order                                  |
+/// | ----------------- | ------------- | ----------------------------- | ---------------------------------------------- |
+/// | stops_, copy_due_ns_ | who sends  | send_stops(), before it locks | mutex_; relaxed: who changes the resource's count notifies afterwards |
+/// | the rest          | who sends     | who sends                     | mutex_, held while it publishes: the order of the messages is that of the writes |
 class OutgoingTopic final : public BoundTopic {
  public:
   /// Throws Error when the type is not installed or rcl refuses. [non-rt]
   OutgoingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number, TopicLog& log);
 
   bool send() override;
+  time_ns_t send_stops(bool may_wait) override;
 
  private:
+  bool send_next() MAUVE_REQUIRES(mutex_);
+  void publish(std::vector<std::byte>& message) MAUVE_REQUIRES(mutex_);
+  void repeat() MAUVE_REQUIRES(mutex_);
+  time_ns_t copy_after_ns() const MAUVE_REQUIRES(mutex_);
   std::string full_name() const override { return rcl_publisher_get_topic_name(publisher_.get()); }
   const TopicEvents& events() const override { return events_; }
 
   Owned<rcl_publisher_t, rcl_publisher_fini> publisher_;
-  std::vector<std::byte> message_;  // keeps its capacity
-  std::uint64_t seen_{0};
+  bool is_reliable_{false};
+  PiMutex mutex_;
+  std::vector<std::byte> message_ MAUVE_GUARDED_BY(mutex_);  // these keep their capacity
+  std::vector<std::byte> stopped_ MAUVE_GUARDED_BY(mutex_);  // the last that a stop has written
+  std::uint64_t seen_ MAUVE_GUARDED_BY(mutex_){0};
+  Atomic<std::uint32_t> stops_{0};           // of the resource, as far as they are sent
+  Atomic<time_ns_t> copy_due_ns_{kForever};  // the next copy of stopped_
+  std::size_t copies_ MAUVE_GUARDED_BY(mutex_){0};
+  time_ns_t stopped_sent_ns_ MAUVE_GUARDED_BY(mutex_){0};
   TopicEvents events_;  // end before the entity that they are of
 };
 

@@ -446,7 +446,8 @@ void Architecture::prepare_outward(Resource& resource, TopicBinding topic) {
                  .found = resource.kind()});
   }
   if (topic == TopicBinding::subscribe) resource.bind_input();
-  if (topic == TopicBinding::publish || resource.client() != nullptr) resource.set_notifier(&publications_);
+  if (topic == TopicBinding::publish || resource.client() != nullptr)
+    resource.set_notifier(&publications_, &stops_);
 }
 
 namespace {

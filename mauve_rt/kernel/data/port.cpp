@@ -11,6 +11,27 @@
 
 namespace mauve {
 
+namespace {
+
+/// While a stop writes to the resource of a service, if it has one. [rt]
+class StopWrite {
+ public:
+  StopWrite(const ServiceBase* service, time_ns_t time_ns) noexcept
+      : resource_(service != nullptr ? service->resource() : nullptr) {
+    if (resource_ != nullptr) resource_->begin_stop(time_ns);
+  }
+  ~StopWrite() {
+    if (resource_ != nullptr) resource_->end_stop();
+  }
+  StopWrite(const StopWrite&) = delete;
+  StopWrite& operator=(const StopWrite&) = delete;
+
+ private:
+  Resource* resource_;
+};
+
+}  // namespace
+
 std::string_view to_string(PortKind kind) noexcept {
   switch (kind) {
     case PortKind::read:
@@ -98,6 +119,12 @@ void PortBase::swap(PortConnection& connection) noexcept {
   MAUVE_RT_TRUSTED(std::swap(connection_, connection));  // moves: nothing is allocated, nothing freed
 }
 
+void PortBase::write_stopped(time_ns_t time_ns) noexcept {
+  if (output().on_stop != OutputPolicy::set_zero) return;
+  const StopWrite as_stop(connection_.service, time_ns);
+  write_zero(time_ns);
+}
+
 bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
   MAUVE_AUDIT(is_closed());
   if (is_safe_) return true;
@@ -112,6 +139,7 @@ bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
 
 bool PortBase::make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) noexcept {
   if (output().on_stop != OutputPolicy::set_zero) return true;
+  const StopWrite as_stop(&service, time_ns);
   const TryWrite tried = try_write_zero(service, time_ns);
   if (tried != TryWrite::must_wait || !may_wait) return tried == TryWrite::done;
   write_zero_to(service, time_ns);

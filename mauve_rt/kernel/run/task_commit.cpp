@@ -412,8 +412,11 @@ void Task::forget_release(Participant& participant) noexcept {
 
 void Task::write_outputs(bool commit, time_ns_t time_ns) noexcept {
   for (const auto& port : shell()->ports()) {
-    const OutputOptions output = port->output();
-    if ((commit ? output.on_commit : output.on_stop) == OutputPolicy::set_zero) port->write_zero(time_ns);
+    if (!commit) {
+      port->write_stopped(time_ns);
+    } else if (port->output().on_commit == OutputPolicy::set_zero) {
+      port->write_zero(time_ns);
+    }
   }
 }
 

@@ -165,6 +165,27 @@ TEST_F(PortsFixture, WritersTimeIsTheLogicalClockOrTheRealOne) {
   EXPECT_EQ(1234, shell.input.read().time_ns);
 }
 
+TEST_F(PortsFixture, AResourceKnowsWhatAStopHasWritten) {
+  SharedData<Number> shared;
+  Notifier written;
+  Notifier stopped;
+  shared.set_notifier(&written, &stopped);
+  shell.output.connect(shared.write, "shared");
+  write_at(1, 5.0);
+  shell.output.write_zero(2);
+  EXPECT_EQ(2U, written.word());
+  EXPECT_EQ(0U, stopped.word());
+  EXPECT_LT(shared.stop_ns(), 1) << "a commit's write is no stop's";
+  shell.output.write_stopped(3);
+  EXPECT_EQ(3, shared.stop_ns());
+  EXPECT_EQ(1U, shared.stops());
+  EXPECT_EQ(1U, stopped.word());
+  shell.output.close();
+  EXPECT_TRUE(shell.output.make_safe(true, 4));
+  EXPECT_EQ(4, shared.stop_ns());
+  EXPECT_EQ(2U, shared.stops());
+}
+
 TEST_F(PortsFixture, AClosedOutputSwallowsWrites) {
   SharedData<Number> shared;
   shell.input.connect(shared.read, "shared");

@@ -1,9 +1,17 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The end of a process by a signal: outputs first, waiting for nobody. Each case ends a process of its own.
+#include <linux/filter.h>
+#include <linux/seccomp.h>
+#include <sys/prctl.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <array>
+#include <cerrno>
 #include <csignal>
+#include <cstddef>
 #include <cstdlib>
+#include <filesystem>
 
 #include "mauve_rt/deploy/process_end.hpp"
 
@@ -76,10 +84,51 @@ TEST_P(EndSignal, MakesOutputsSafe) {
     const int signal = wait_end_signal();
     sender.join();
     const bool is_safe = robot.all_are(0.0) && !robot.deployer.is_deployed();
-    _exit(signal == GetParam() && is_safe ? 0 : 3);
+    const bool is_marked =
+        std::ranges::all_of(robot.outputs, [](auto* output) { return output->stops() == 1; });
+    _exit(signal == GetParam() && is_safe && is_marked ? 0 : 3);
   };
   EXPECT_EXIT(live(), ExitedWithCode(0), "");
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)  // they map memory of their own
+
+/// From now on the system gives this process neither a thread nor memory.
+bool forbid_threads_and_memory() {
+  constexpr std::array calls{__NR_clone, __NR_clone3, __NR_mmap, __NR_brk};
+  std::vector<sock_filter> filter{BPF_STMT(BPF_LD | BPF_W | BPF_ABS, offsetof(seccomp_data, nr))};
+  for (const int call : calls) {
+    filter.push_back(BPF_JUMP(BPF_JMP | BPF_JEQ | BPF_K, static_cast<std::uint32_t>(call), 0, 1));
+    filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ERRNO | EAGAIN));
+  }
+  filter.push_back(BPF_STMT(BPF_RET | BPF_K, SECCOMP_RET_ALLOW));
+  const sock_fprog program{.len = static_cast<unsigned short>(filter.size()), .filter = filter.data()};
+  return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) == 0 &&
+         syscall(SYS_seccomp, SECCOMP_SET_MODE_FILTER, SECCOMP_FILTER_FLAG_TSYNC, &program) == 0;
+}
+
+TEST_F(ProcessEnd, OutputsAreSafeWithoutAnotherThreadOrMoreMemory) {
+  const auto live = [] {
+    Robot robot;
+    const auto threads = [] {
+      return std::distance(std::filesystem::directory_iterator("/proc/self/task"), {});
+    };
+    const auto before = threads();
+    std::thread sender([&] {
+      constexpr int kOwn = 1;
+      constexpr int kOfTheEnd = 2;
+      wait_until([&] { return threads() == before + kOwn + kOfTheEnd; }, "the threads of the end");
+      if (!forbid_threads_and_memory()) _exit(4);
+      kill(getpid(), SIGTERM);
+    });
+    wait_end_signal({.dump_signal = SIGRTMIN});
+    sender.join();
+    _exit(robot.all_are(0.0) ? 0 : 3);
+  };
+  EXPECT_EXIT(live(), ExitedWithCode(0), "");
+}
+
+#endif
 
 TEST_F(ProcessEnd, AComponentThatHangsIsGivenUp) {
   const auto live = [] {

@@ -220,12 +220,14 @@ def test_messages_are_sent_where_and_as_urgently_as_the_file_says(bind: Bind) ->
   word: {kind: shared_data, type: std_msgs/msg/String, topic: {name: word, direction: publish}}
 """)
     tasks = Path("/proc/self/task").iterdir()
-    sender = next(int(task.name) for task in tasks if (task / "comm").read_text() == "topics_out\n")
-    assert os.sched_getaffinity(sender) == {0}
+    senders = {(task / "comm").read_text().strip(): int(task.name) for task in tasks}
+    sender, of_stops = senders["topics_out"], senders["stops_out"]
+    assert os.sched_getaffinity(sender) == os.sched_getaffinity(of_stops) == {0}
     if resource.getrlimit(resource.RLIMIT_RTPRIO)[0] == 0 and os.geteuid() != 0:
         pytest.skip("needs the right to real-time priorities (rtprio)")
     assert os.sched_getscheduler(sender) == os.SCHED_FIFO
     assert os.sched_getparam(sender).sched_priority == 7
+    assert os.sched_getparam(of_stops).sched_priority == 8
 
 
 def test_a_quality_of_service_that_does_not_fit_is_told(bind: Bind, graph: Any) -> None:

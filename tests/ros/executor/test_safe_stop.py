@@ -5,6 +5,7 @@ import fcntl
 import os
 import signal
 import socket
+import tempfile
 import time
 import tty
 from collections.abc import Callable, Iterator
@@ -14,10 +15,11 @@ from typing import Any
 import pytest
 from lifecycle_msgs.msg import Transition
 from lifecycle_msgs.srv import ChangeState
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Float64
 
 from mauve_msgs.msg import ReconfigurationStep
-from mauve_msgs.srv import ListComponents, LoadRules, Reconfigure
+from mauve_msgs.srv import ListComponents, LoadRules, Reconfigure, Stop
 from mauve_rt._kernel import STOP_TIMEOUT_NS
 from mauve_rt.control.requests import Code
 
@@ -35,6 +37,34 @@ def counts_of(graph: Any) -> list[Float64]:
 
 def await_safe(graph: Any, counts: list[Float64]) -> None:
     graph.spin_until(lambda: counts[-1].data == 0.0, "the type's zero, written at the stop")
+
+
+@pytest.mark.parametrize("sent", [("best_effort", 3), ("reliable", 1)])
+@pytest.mark.parametrize("how", ["signal", "deactivate", "stop"])
+def test_the_output_of_a_stop_is_sent_three_times_where_a_message_may_be_lost(
+    sent: tuple[str, int], how: str, architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    qos, times = sent
+    text = architecture.read_text(encoding="utf-8")
+    published = "name: count, direction: publish"
+    architecture.write_text(text.replace(published, f"{published}, qos: {qos}"), encoding="utf-8")
+    executor = start_executor("-p", f"architecture:={architecture}")
+    reliability = ReliabilityPolicy[qos.upper()]
+    counts = graph.hear(Float64, "/robot_1/count", QoSProfile(depth=100, reliability=reliability))
+    graph.spin_until(lambda: len(counts) > 3, "counts")
+    if how == "deactivate":
+        assert graph.ask(ChangeState, f"{NODE}/change_state", transition=DEACTIVATE).success
+    elif how == "stop":
+        assert graph.ask(Stop, f"{NODE}/stop", component="counter").success
+    if how != "stop":
+        assert executor.end(signal.SIGTERM)[0] == 0
+    graph.spin_until(lambda: [count.data for count in counts].count(0.0) >= times, "all of them")
+    if how == "stop":
+        time.sleep(0.1)  # for one too many
+        assert executor.end(signal.SIGTERM)[0] == 0
+    assert counts[-times].data == 0.0
+    if qos == "best_effort":  # a reliable one is sent again while it is not acknowledged
+        assert [count.data for count in counts].count(0.0) == times
 
 
 @pytest.fixture(params=["pipe", "terminal"])
@@ -89,6 +119,21 @@ def test_a_signal_waits_for_no_lock_of_the_interpreter(
         executor.wait()
     finally:
         keeping.unlink()
+
+
+def test_a_signal_needs_no_thread_and_no_memory(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    text = architecture.read_text(encoding="utf-8").replace("period_ms: 5000", "period_ms: 20")
+    before = "sleepy: {shell: executor_tests/CounterShell, core: executor_tests/"
+    text = text.replace(f"{before}Counter,", f"{before}PyForbidding,", 1)
+    architecture.write_text(text, encoding="utf-8")
+    executor = start_executor("-p", f"architecture:={architecture}")
+    counts = counts_of(graph)
+    time.sleep(1.0)  # for the threads of the start
+    Path(tempfile.gettempdir(), f"mauve_forbidding_{executor.process.pid}").touch()
+    await_safe(graph, counts)
+    assert executor.wait() == 0, executor.output
 
 
 class Manager:

@@ -2,6 +2,8 @@
 // Middleware: what is behind the simulated rcl. It delivers messages in virtual time, and loses, refuses and fails as the seed wants.
 #pragma once
 
+#include <pthread.h>
+
 #include <cstddef>
 #include <cstdint>
 #include <deque>
@@ -37,6 +39,9 @@ struct CarriedMessage {
   std::uint64_t entity;  // the publisher or subscription
   Bytes data;
   bool is_sent{true};
+  std::uint64_t order{0};  // in which all messages began to be published
+  std::uint64_t ended{0};  // so many had begun when this one ended
+  pthread_t thread{};      // that published it
 };
 /// A message that waits for the bridge.
 struct WaitingMessage {
@@ -82,7 +87,8 @@ class Middleware {
 
   std::map<std::string, std::vector<CarriedMessage>> published{};  // by topic
   std::map<std::string, std::vector<CarriedMessage>>
-      taken{};  // likewise, but by subscriptions that only report arrivals
+      taken{};                 // likewise, but by subscriptions that only report arrivals
+  std::uint64_t publishes{0};  // that have begun
   std::vector<SentRequest> requests{};
   std::vector<SentResponse> responses{};
   std::map<std::int64_t, bool> taken_requests{};  // of services, by number; true: the response was refused
@@ -100,6 +106,7 @@ class Middleware {
     Kind kind;
     std::string name{};
     std::size_t depth{0};
+    rmw_qos_profile_t qos{};
     std::uint64_t of{0};  // of an event: its publisher or subscription
     std::deque<WaitingMessage> waiting{};
     bool is_triggered{false};       // of a guard

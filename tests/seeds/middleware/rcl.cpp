@@ -113,8 +113,8 @@ rcl_ret_t rcl_trigger_guard_condition(rcl_guard_condition_t* guard) {
 
 rcl_ret_t rcl_publisher_init(rcl_publisher_t* publisher, const rcl_node_t* /*node*/,
                              const rosidl_message_type_support_t* /*type*/, const char* topic,
-                             const rcl_publisher_options_t* /*options*/) {
-  publisher->number = here().open({.kind = Kind::publisher, .name = topic});
+                             const rcl_publisher_options_t* options) {
+  publisher->number = here().open({.kind = Kind::publisher, .name = topic, .qos = options->qos});
   return RCL_RET_OK;
 }
 rcl_ret_t rcl_publisher_fini(rcl_publisher_t* publisher, rcl_node_t* /*node*/) {
@@ -124,17 +124,30 @@ rcl_ret_t rcl_publisher_fini(rcl_publisher_t* publisher, rcl_node_t* /*node*/) {
 const char* rcl_publisher_get_topic_name(const rcl_publisher_t* publisher) {
   return name_of(publisher->number, Kind::publisher);
 }
+const rmw_qos_profile_t* rcl_publisher_get_actual_qos(const rcl_publisher_t* publisher) {
+  auto* const entity = here().find(publisher->number, Kind::publisher, "quality of service");
+  return entity == nullptr ? nullptr : &entity->qos;
+}
+rcl_ret_t rcl_publisher_wait_for_all_acked(const rcl_publisher_t* /*publisher*/, std::int64_t timeout_ns) {
+  here().pass(std::min<std::int64_t>(timeout_ns, ms_to_ns(2)));
+  return here().fails(2) ? RCL_RET_TIMEOUT : RCL_RET_OK;
+}
 rcl_ret_t rcl_publish_serialized_message(const rcl_publisher_t* publisher,
                                          const rcl_serialized_message_t* message, void* /*allocation*/) {
   auto* const entity = here().find(publisher->number, Kind::publisher, "publish");
   if (entity == nullptr) return RCL_RET_ERROR;
   ++entity->users;
+  const std::uint64_t order = ++here().publishes;
   if (here().fails(here().failures.blocked_publish)) mauve::sleep_for(ms_to_ns(4));
   here().pass(us_to_ns(10));
   --entity->users;
   const bool is_sent = !here().fails(here().failures.publish);
-  here().published[entity->name].push_back(
-      {.entity = publisher->number, .data = bytes_of(*message), .is_sent = is_sent});
+  here().published[entity->name].push_back({.entity = publisher->number,
+                                            .data = bytes_of(*message),
+                                            .is_sent = is_sent,
+                                            .order = order,
+                                            .ended = here().publishes,
+                                            .thread = pthread_self()});
   return is_sent ? RCL_RET_OK : RCL_RET_ERROR;
 }
 

@@ -89,6 +89,17 @@ class BridgeNetwork {
 
   /// Numbers whose writes were accepted and have ended.
   const std::vector<double>& accepted(const std::string& name) const { return accepted_.at(name); }
+  /// Outputs that a stop has written, by their numbers: what was to be seen when it had.
+  struct Stop {
+    std::string name;
+    std::uint64_t publishes;  // that had begun
+    std::uint64_t entity;     // the publisher, if it was attached; else 0
+  };
+  const std::map<double, Stop>& stops() const noexcept { return stops_; }
+  /// When a number was written, by the writer's clock.
+  time_ns_t time_of(double number) const { return times_.at(number); }
+  std::map<std::string, bool> are_attached{};
+
   /// What a read gives now; 0: nothing.
   double next(const std::string& name) {
     ReaderState reader;
@@ -171,8 +182,16 @@ class BridgeNetwork {
       pause(dice);
       const std::string name = dice.one_of(std::array<std::string, 3>{"latest_out", "ring_out", "over_out"});
       auto& service = dynamic_cast<WriteService<Wide>&>(*resource(name).find_service("write"));
-      const bool is_accepted = service.write(value_of<Wide>(number), monotonic_now_ns());
+      const time_ns_t now_ns = monotonic_now_ns();
+      times_[number] = now_ns;
+      const bool is_stop = dice.once_in(6);
+      if (is_stop) resource(name).begin_stop(now_ns);
+      const bool is_accepted = service.write(value_of<Wide>(number), now_ns);
       if (is_accepted) accepted_[name].push_back(number);
+      if (!is_stop) continue;
+      const std::uint64_t entity = are_attached[name] ? middleware_.entity_of(name) : 0;
+      resource(name).end_stop();
+      stops_[number] = {.name = name, .publishes = middleware_.publishes, .entity = entity};
     }
   }
   void read() {
@@ -296,6 +315,8 @@ class BridgeNetwork {
   bool is_ended_{false};
   std::map<std::string, std::vector<double>> accepted_{
       {"latest_out", {}}, {"ring_out", {}}, {"over_out", {}}};
+  std::map<double, time_ns_t> times_;
+  std::map<double, Stop> stops_;
   std::vector<double> ring_in_;
   std::uint32_t last_question_{0};
   std::map<std::uint32_t, bool> answered_;       // calls, by question

@@ -113,6 +113,8 @@ rcl_ret_t rcl_publisher_init(rcl_publisher_t* publisher, const rcl_node_t* node,
                              const rcl_publisher_options_t* options);
 rcl_ret_t rcl_publisher_fini(rcl_publisher_t* publisher, rcl_node_t* node);
 const char* rcl_publisher_get_topic_name(const rcl_publisher_t* publisher);
+const rmw_qos_profile_t* rcl_publisher_get_actual_qos(const rcl_publisher_t* publisher);
+rcl_ret_t rcl_publisher_wait_for_all_acked(const rcl_publisher_t* publisher, std::int64_t timeout_ns);
 rcl_ret_t rcl_publish_serialized_message(const rcl_publisher_t* publisher,
                                          const rcl_serialized_message_t* message, void* allocation);
 

@@ -238,6 +238,8 @@ class Architecture final : public Configurable {
   bool next_published(std::string& resource, std::vector<std::byte>& message, time_ns_t& time_ns);
   /// Told of the writes to published resources, and of clients' calls.
   Notifier& publications() noexcept { return publications_; }
+  /// Notified when a stop has written to one of them.
+  Notifier& stops() noexcept { return stops_; }
   /// Wires a resource that nobody uses yet to those who carry things in and out. [non-rt] Throws as publish(), and
   /// as Resource::bind_input().
   void prepare_outward(Resource& resource, TopicBinding topic);
@@ -382,6 +384,7 @@ class Architecture final : public Configurable {
   Authors authors_;
   Overlays overlays_;
   Notifier publications_;
+  Notifier stops_;
   Atomic<time_ns_t> deployment_epoch_ns_{0};
   mutable Mutex list_mutex_;
   std::vector<std::string> names_ MAUVE_GUARDED_BY(list_mutex_);  // by number

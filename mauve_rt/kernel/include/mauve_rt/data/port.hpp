@@ -234,7 +234,7 @@ class WritePort final : public PortBase {
   }
   /// Of a port that was closed while it wrote: the zeros stay last, whoever wrote first.
   void keep_zero() noexcept {
-    if (keeps_zero() && output_.on_stop == OutputPolicy::set_zero) write_zero();
+    if (keeps_zero()) write_stopped(stamp_ns());
   }
   bool put(const T& value, time_ns_t time_ns) noexcept {
     return seat_ != nullptr ? service_->write_seated(value, time_ns, *seat_)

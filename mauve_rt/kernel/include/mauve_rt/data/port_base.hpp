@@ -123,6 +123,8 @@ class PortBase {
   /// Writes the type's default value, as of now or as of that time; a port that is no write port does nothing. [rt]
   void write_zero() MAUVE_RT { write_zero(stamp_ns()); }
   virtual void write_zero(time_ns_t /*time_ns*/) MAUVE_RT {}
+  /// Writes what `on_stop` says, as the output of a stop: it is sent before all others. [rt]
+  void write_stopped(time_ns_t time_ns) MAUVE_RT;
   /// The same to a service that fits the port, whether it is connected to it or not, without waiting for a lock. [rt]
   virtual TryWrite try_write_zero(ServiceBase& /*service*/, time_ns_t /*time_ns*/) MAUVE_RT {
     return TryWrite::done;

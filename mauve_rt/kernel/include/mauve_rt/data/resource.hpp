@@ -110,9 +110,11 @@ enum class TopicBinding : std::uint8_t { none, publish, subscribe };
 
 /// Derive from this to offer services of your own; a service is a member registered by offer().
 ///
-/// | member | written by       | read by         | under      |
-/// | ------ | ---------------- | --------------- | ---------- |
-/// | use_   | ordinary threads | the same        | use_mutex_ |
+/// | member   | written by       | read by           | under / order                                                  |
+/// | -------- | ---------------- | ----------------- | -------------------------------------------------------------- |
+/// | use_     | ordinary threads | the same          | use_mutex_                                                     |
+/// | stop_ns_ | begin_stop()     | who sends samples | relaxed: before the write, so who has the sample sees the time |
+/// | stops_   | end_stop()       | who sends samples | release/acquire: who sees the count finds the sample           |
 class Resource : public ConfigurablePart, public std::enable_shared_from_this<Resource> {
  public:
   /// `kind` and `type` as the architecture file names them.
@@ -135,8 +137,11 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   /// Throws Error (out_of_range): below 0, or above kLongest.
   void set_longest_hold_ns(time_ns_t longest_hold_ns);
 
-  /// Whom to tell of writes and calls, for those who carry them outside. [setup]
-  void set_notifier(Notifier* notifier) noexcept { notifier_ = notifier; }
+  /// Notified of writes and calls, for those who carry them outside; `of_stops`: of the writes of a stop, too. [setup]
+  void set_notifier(Notifier* notifier, Notifier* of_stops = nullptr) noexcept {
+    notifier_ = notifier;
+    stop_notifier_ = of_stops;
+  }
   /// Whom else to tell of every write that succeeded, until unlisten(), while writers run. [non-rt]
   /// Throws Error (out_of_range) when there are too many.
   void listen(EventListener& listener) { listeners_.add(listener, name_); }
@@ -154,6 +159,25 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   /// Counts who calls write_sample(), e.g. an incoming topic, as one port of each service that writes.
   /// [setup] Throws Error (invalid_argument) when one takes no more.
   void bind_input();
+
+  // A stop writes between these two what `on_stop` of an output says.
+
+  /// [rt]
+  void begin_stop(time_ns_t time_ns) MAUVE_RT {
+    time_ns_t before_ns = stop_ns_.load(std::memory_order_relaxed);
+    while (before_ns < time_ns &&
+           !stop_ns_.compare_exchange_weak(before_ns, time_ns, std::memory_order_relaxed)) {
+    }
+  }
+  /// [rt]
+  void end_stop() MAUVE_RT {
+    stops_.fetch_add(1, std::memory_order_release);
+    if (stop_notifier_ != nullptr) stop_notifier_->notify();
+  }
+  /// A sample of this time, or of an earlier one, was written by a stop or before it. [rt]
+  time_ns_t stop_ns() const MAUVE_RT { return stop_ns_.load(std::memory_order_relaxed); }
+  /// How many stops have written. [rt]
+  std::uint32_t stops() const MAUVE_RT { return stops_.load(std::memory_order_acquire); }
 
   // The serialized face, for topics and for languages other than C++. Ordinary threads.
 
@@ -223,6 +247,9 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   time_ns_t longest_hold_ns_{0};
   std::vector<ServiceBase*> services_;
   Notifier* notifier_{nullptr};
+  Notifier* stop_notifier_{nullptr};
+  Atomic<time_ns_t> stop_ns_{INT64_MIN};
+  Atomic<std::uint32_t> stops_{0};
   std::uint64_t handed_out_{0};  // as `seen`, of next_published()
   EventListeners listeners_;
   mutable Mutex use_mutex_;

@@ -22,10 +22,9 @@ struct EndOptions {
 /// Blocks the signals in the calling thread and in those that it creates from now on. [setup], first of all, main thread.
 void block_end_signals() noexcept;
 /// Sleeps until one of the signals comes. Then shuts down every deployer of the process, for good (Deployer::end()): outputs
-/// are safe on return. Waits for no other thread but for the components' own, and takes no lock of Python. Returns the
-/// signal. [non-rt]
-int wait_end_signal(const EndOptions& options = {}) noexcept;
-/// Ends the process after this time, without destroying anything, unless it has ended before. [non-rt]
-void end_process_after(const EndOptions& options) noexcept;
+/// are safe on return. Waits for no other thread but for the components' own, and takes no lock of Python. Threads and memory
+/// for the end are there before the signal: a process that gets no more of either ends the same way. Returns the signal. [non-rt]
+/// Throws std::bad_alloc or std::system_error, before it sleeps: the system gives too little of them already.
+int wait_end_signal(const EndOptions& options = {});
 
 }  // namespace mauve
