@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mauve_rt._bridge import NodeWatch
@@ -186,8 +188,9 @@ class ExecutorNode(LifecycleNode):
         return super().create_service(srv_type, srv_name, guarded, **options)
 
     def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
-        """As rclpy's."""
+        """As rclpy's, but by the monotonic clock."""
         guarded = self.watch.guarded("a timer's work", callback)
+        options.setdefault("clock", Clock(clock_type=ClockType.STEADY_TIME))
         return super().create_timer(timer_period_sec, guarded, *more, **options)
 
     def create_subscription(
