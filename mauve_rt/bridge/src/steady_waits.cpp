@@ -51,16 +51,22 @@ int wait_for_semaphore(sem_t* semaphore, const timespec* deadline) {
   return sem_clockwait(semaphore, CLOCK_MONOTONIC, &until);
 }
 
+int lock_mutex(pthread_mutex_t* mutex, const timespec* deadline) {
+  const timespec until = by_the_monotonic_clock(*deadline);
+  return pthread_mutex_clocklock(mutex, CLOCK_MONOTONIC, &until);
+}
+
 struct Redirection {
   std::string_view function;
   std::string_view library;  // part of its file's name; "": any
   std::uintptr_t to;
 };
 
-// A condition variable may have CLOCK_MONOTONIC, as the interpreter's: those of Fast DDS do not. A semaphore cannot.
-// pthread_mutex_timedlock() is left alone: it returns as soon as the owner unlocks.
+// A condition variable may have CLOCK_MONOTONIC, as those of the interpreter, and a mutex with priority inheritance may
+// refuse it: those of Fast DDS do not. A semaphore has CLOCK_REALTIME, and an interpreter of its own wheel waits by one.
 const std::array kRedirections{
     Redirection{"pthread_cond_timedwait", "libfastrtps", std::bit_cast<std::uintptr_t>(&wait_for_condition)},
+    Redirection{"pthread_mutex_timedlock", "libfastrtps", std::bit_cast<std::uintptr_t>(&lock_mutex)},
     Redirection{"sem_timedwait", "", std::bit_cast<std::uintptr_t>(&wait_for_semaphore)},
 };
 
