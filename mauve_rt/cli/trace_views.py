@@ -60,7 +60,13 @@ def info_view(values: Mapping[str, Any]) -> Group:
     topics = number_table(["topic"], ["type"], ["messages"])
     for name, topic in values["topics"].items():
         topics.add_row(escape(name), escape(topic["type"]), f"{topic['messages']:,}")
-    return Group(escape(head), *(f"[red]{escape(line)}" for line in damages), *map(escape, values["clock_steps"]), components, topics)
+    return Group(
+        escape(head),
+        *(f"[red]{escape(line)}" for line in damages),
+        *map(escape, values["clock_steps"]),
+        components,
+        topics,
+    )
 
 
 def statistics_values(found: ComponentStatistics) -> dict[str, Any]:

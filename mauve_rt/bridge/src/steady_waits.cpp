@@ -75,17 +75,19 @@ class Imports {
  public:
   explicit Imports(const dl_phdr_info& library) noexcept : library_(library) {
     for (const auto& header : segments())
-      if (header.p_type == PT_DYNAMIC) read(std::bit_cast<const ElfW(Dyn)*>(library.dlpi_addr + header.p_vaddr));
+      if (header.p_type == PT_DYNAMIC)
+        read(std::bit_cast<const ElfW(Dyn)*>(library.dlpi_addr + header.p_vaddr));
   }
 
   void redirect(std::span<const Redirection> redirections) const noexcept {
     if (names_ == nullptr || symbols_ == nullptr) return;
     for (const auto& table : {calls_, pointers_}) {
       for (const ElfW(Rela) & entry : table) {
-        const ElfW(Sym)& symbol = symbols_[ELF64_R_SYM(entry.r_info)];
+        const ElfW(Sym) & symbol = symbols_[ELF64_R_SYM(entry.r_info)];
         if (symbol.st_name == 0 || symbol.st_shndx != SHN_UNDEF) continue;
         for (const Redirection& one : redirections) {
-          if (one.function == names_ + symbol.st_name && is_of(one.library)) write(library_.dlpi_addr + entry.r_offset, one.to);
+          if (one.function == names_ + symbol.st_name && is_of(one.library))
+            write(library_.dlpi_addr + entry.r_offset, one.to);
         }
       }
     }
@@ -136,7 +138,7 @@ class Imports {
 
   const dl_phdr_info& library_;
   const char* names_{nullptr};
-  const ElfW(Sym) * symbols_ { nullptr };
+  const ElfW(Sym) * symbols_{nullptr};
   std::span<const ElfW(Rela)> calls_{};
   std::span<const ElfW(Rela)> pointers_{};
 };

@@ -13,7 +13,15 @@ from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.kinds import RecordKind, kinds_known
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.architecture import ComponentInfo
-from mauve_rt.trace.reading.facts import BagFile, ClockStep, Deployment, Loss, Message, MessageSource, TracedDecision
+from mauve_rt.trace.reading.facts import (
+    BagFile,
+    ClockStep,
+    Deployment,
+    Loss,
+    Message,
+    MessageSource,
+    TracedDecision,
+)
 from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:

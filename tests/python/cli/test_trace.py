@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from rosbags.highlevel import AnyReader
 
 import mauve_rt.trace
 from mauve_rt.cli.main import main
@@ -78,6 +79,8 @@ def test_a_step_of_the_clock_is_reported(
     assert " at 2023-11-14T22:13:22+00:00 of the time before" in shown
     assert main(["trace", "info", str(tmp_path / "bag")]) == 0
     assert how in " ".join(capsys.readouterr().out.split())
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert reader.end_time - 1 - reader.start_time == (3 + max(by_s, 0)) * 10**9  # log times are in order
     times_ns = [step.realtime_ns for step in mauve_rt.trace.open(tmp_path / "bag").clock_steps]
     assert times_ns == [begin_ns + 2 * 10**9 + 1_700_000_000 * 10**9]
 

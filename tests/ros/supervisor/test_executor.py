@@ -112,6 +112,16 @@ class Band:
             assert time.monotonic() < deadline_s, f"it did not happen; decisions: {self.said()}"
             self.spinner.spin_once(timeout_sec=0.1)
 
+    def await_rest(self) -> None:
+        """The peer is heard: the rule is armed, and decides nothing for longer than it waits for anything."""
+        told, since_s = -1, 0.0
+        deadline_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < since_s + 2 * LASTING_S:
+            assert time.monotonic() < deadline_s, f"no rest; decisions: {self.said()}"
+            self.spinner.spin_once(timeout_sec=0.1)
+            if len(self.decisions) != told or self.core() != "mauve_examples/Metronome":
+                told, since_s = len(self.decisions), time.monotonic()
+
     def said(self) -> list[str]:
         return [decision.decision for decision in self.decisions]
 
@@ -179,17 +189,30 @@ def test_a_core_is_replaced_in_flight_and_back(band: Band):
 @pytest.mark.parametrize("step_s", [-600, 600])  # longer than the test waits for anything
 def test_a_step_of_the_clock_is_no_silence(stepped_band: Band, stepped_clock: SteppedClock, step_s: int):
     band = stepped_band
-    band.until(lambda: band.said()[-1:] == ["armed"])
+    band.await_rest()
+    told = len(band.decisions)
     stepped_clock.step(step_s)
-    end_s = time.monotonic() + 2 * LASTING_S
-    while time.monotonic() < end_s:
-        band.spinner.spin_once(timeout_sec=0.1)
-    assert band.said()[-1:] == ["armed"]
+    band.await_rest()
+    assert len(band.decisions) == told
     band.playing = False
     band.until(lambda: band.said()[-1:] == ["done"])
     band.until(lambda: band.core() == "mauve_examples/Accelerando")
     band.playing = True
     band.until(lambda: band.said()[-2:] == ["undo", "done"])
+    band.end_supervisor()
+    assert band.supervisor_process.returncode == 0
+
+
+def test_a_supervisor_without_input_ends_after_a_step_of_the_clock(
+    stepped_band: Band, stepped_clock: SteppedClock
+):
+    band = stepped_band
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.executor_process.kill()
+    band.executor_process.communicate()
+    time.sleep(LASTING_S)  # it waits, for nothing comes any longer
+    stepped_clock.step(-600)
     band.end_supervisor()
     assert band.supervisor_process.returncode == 0
 
