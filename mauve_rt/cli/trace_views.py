@@ -60,13 +60,8 @@ def info_view(values: Mapping[str, Any]) -> Group:
     topics = number_table(["topic"], ["type"], ["messages"])
     for name, topic in values["topics"].items():
         topics.add_row(escape(name), escape(topic["type"]), f"{topic['messages']:,}")
-    return Group(
-        escape(head),
-        *(f"[red]{escape(line)}" for line in damages),
-        *map(escape, values["clock_steps"]),
-        components,
-        topics,
-    )
+    notes = [*(f"[red]{escape(line)}" for line in damages), *map(escape, values["clock_steps"])]
+    return Group(escape(head), *notes, components, topics)
 
 
 def statistics_values(found: ComponentStatistics) -> dict[str, Any]:
