@@ -63,9 +63,11 @@ struct Redirection {
 };
 
 // A condition variable may have CLOCK_MONOTONIC, as those of the interpreter, and a mutex with priority inheritance may
-// refuse it: those of Fast DDS do not. A semaphore has CLOCK_REALTIME, and an interpreter of its own wheel waits by one.
+// refuse it: those of Fast DDS and of the log of ROS do not. A semaphore always has CLOCK_REALTIME, and interpreters that
+// are built for an old glibc wait by semaphores.
 const std::array kRedirections{
     Redirection{"pthread_cond_timedwait", "libfastrtps", std::bit_cast<std::uintptr_t>(&wait_for_condition)},
+    Redirection{"pthread_cond_timedwait", "spdlog", std::bit_cast<std::uintptr_t>(&wait_for_condition)},
     Redirection{"pthread_mutex_timedlock", "libfastrtps", std::bit_cast<std::uintptr_t>(&lock_mutex)},
     Redirection{"sem_timedwait", "", std::bit_cast<std::uintptr_t>(&wait_for_semaphore)},
 };
