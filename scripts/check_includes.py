@@ -100,7 +100,9 @@ PLAIN_ATOMICS = {
 }
 
 # Of the bridge these do not run under the seeded scheduler.
-BY_THE_SYSTEM = tuple(f"mauve_rt/bridge/src/{name}." for name in ("console", "node_watch", "stop_guard"))
+BY_THE_SYSTEM = tuple(
+    f"mauve_rt/bridge/src/{name}." for name in ("console", "node_watch", "steady_waits", "stop_guard")
+)
 
 # Examples and benchmarks see the kernel as any user does: by the door and by headers of storeys.
 PUBLIC_ONLY = ("mauve_examples", "benchmarks")

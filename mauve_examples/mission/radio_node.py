@@ -14,6 +14,8 @@ from typing import Any
 import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import FloatingPointRange, ParameterDescriptor, SetParametersResult
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
@@ -82,8 +84,9 @@ class Radio(Node):
             for robot in robots
         ]
         self.create_service(SetBool, "~/set_link", self._set_link)
-        self.create_timer(CONNECTION_CHECK_S, self._check_connected)
-        self.create_timer(1.0, self._publish_counts)
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(CONNECTION_CHECK_S, self._check_connected, clock=self._steady)
+        self.create_timer(1.0, self._publish_counts, clock=self._steady)
         self.add_on_set_parameters_callback(self._set_parameters)
         self._was_connected: bool | None = None
         self._link.publish(Bool(data=True))
@@ -123,7 +126,7 @@ class Radio(Node):
             timer.cancel()
             self._switch(up=up)
 
-        timer = self.create_timer(at_s, change)
+        timer = self.create_timer(at_s, change, clock=self._steady)
 
     def _set_parameters(self, parameters: list[Any]) -> Any:
         for parameter in parameters:

@@ -34,6 +34,7 @@ def info_values(trace: Trace) -> dict[str, Any]:
             for file in trace.files
         ],
         "recorded": datetime.fromtimestamp(realtime_ns / 1e9, UTC).isoformat(timespec="seconds"),
+        "clock_steps": [step.text for step in trace.clock_steps],
         "duration_s": (end_ns - begin_ns) / 1e9,
         "records": sum(loss.received for loss in trace.losses.values()),
         "lost": trace.lost,
@@ -59,7 +60,8 @@ def info_view(values: Mapping[str, Any]) -> Group:
     topics = number_table(["topic"], ["type"], ["messages"])
     for name, topic in values["topics"].items():
         topics.add_row(escape(name), escape(topic["type"]), f"{topic['messages']:,}")
-    return Group(escape(head), *(f"[red]{escape(line)}" for line in damages), components, topics)
+    notes = [*(f"[red]{escape(line)}" for line in damages), *map(escape, values["clock_steps"])]
+    return Group(escape(head), *notes, components, topics)
 
 
 def statistics_values(found: ComponentStatistics) -> dict[str, Any]:

@@ -10,6 +10,7 @@
 #include "interpreter.hpp"
 #include "node_watch.hpp"
 #include "parameters.hpp"
+#include "steady_waits.hpp"
 #include "stop_guard.hpp"
 #include "types.hpp"
 
@@ -124,6 +125,10 @@ PYBIND11_MODULE(_bridge, module) {
 Once, after rclpy.init(), which was told `--disable-stdout-logs`.)");
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked(),
              "Wait until all lines are written; False: the console is not read.");
+  module.def("wait_by_the_monotonic_clock", &wait_by_the_monotonic_clock,
+             R"(Let the middleware that is loaded wait by CLOCK_MONOTONIC, where it would by CLOCK_REALTIME.
+
+Once, after rclpy.init() and before the first node.)");
   module.def(
       "parameters_of", &python_parameters, py::arg("words"),
       R"(What `--ros-args` says to nodes, in rcl's order: their name or pattern, and values by parameter.

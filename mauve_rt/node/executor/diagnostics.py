@@ -58,8 +58,8 @@ class Diagnostics:
         self._allocation_counting = allocation_counting()
         self._backlog = 0  # at the last status
 
-    def publish(self, *, error: str = "") -> None:
-        """Publish once; `error`: why the last lifecycle transition failed."""
+    def publish(self, *, error: str = "", clock: str = "") -> None:
+        """Publish once; `error`: why the last lifecycle transition failed; `clock`: its recent step."""
         maxima = {recent.component: recent for recent in self._runtime.take_recent_maxima()}
         parts = [part for part in self._runtime.components() if part.name in maxima]
         array = DiagnosticArray(status=[self._component(part, maxima[part.name]) for part in parts])
@@ -76,7 +76,7 @@ class Diagnostics:
             array.status.append(self._bag(recording))
         if late := self._late():
             array.status.append(late)
-        array.status.append(self._process(error))
+        array.status.append(self._process(error, clock))
         self._publisher.publish(array)
 
     def _component(self, part: ComponentDescription, recent: RecentMaxima) -> Any:
@@ -283,7 +283,7 @@ class Diagnostics:
         self._told[component, what] = count
         return count - before if count >= before else count
 
-    def _process(self, error: str) -> Any:
+    def _process(self, error: str, clock: str) -> Any:
         status = self._runtime.realtime_status()
         missing = list(status.missing) if status is not None else []
         usage = resource.getrusage(resource.RUSAGE_SELF)
@@ -293,6 +293,8 @@ class Diagnostics:
         if before and self._backlog:
             level = DiagnosticStatus.WARN
             message = f"a network interface stands still: {self._backlog} bytes wait, and more are dropped"
+        if clock:
+            level, message = DiagnosticStatus.WARN, clock
         if left_behind := self._runtime.threads_left_behind():
             level, message = (
                 DiagnosticStatus.WARN,

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from rclpy.clock import Clock
+from rclpy.clock_type import ClockType
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 
 from mauve_rt._bridge import NodeWatch
@@ -31,6 +33,7 @@ from mauve_rt.node.executor.state_folder import StateFolder
 from mauve_rt.node.shared.service_thread import refused_reply
 from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_settings
 from mauve_rt.node.shared.settings import OF_RCLPY, refusal
+from mauve_rt.node.shared.wall_clock import WallClock
 from mauve_rt.node.shared.watch import Watch
 from mauve_rt.trace.bag.recorded import Split
 from mauve_rt.trace.errors import TraceError
@@ -124,6 +127,7 @@ class ExecutorNode(LifecycleNode):
         )
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
+        self._wall_clock = WallClock()
         control = Control(
             self._runtime,
             phase_timeout_s=self._settings["report_phase_timeout_s"],
@@ -186,8 +190,9 @@ class ExecutorNode(LifecycleNode):
         return super().create_service(srv_type, srv_name, guarded, **options)
 
     def create_timer(self, timer_period_sec: float, callback: Any, *more: Any, **options: Any) -> Any:
-        """As rclpy's."""
+        """As rclpy's, but by the monotonic clock."""
         guarded = self.watch.guarded("a timer's work", callback)
+        options.setdefault("clock", Clock(clock_type=ClockType.STEADY_TIME))
         return super().create_timer(timer_period_sec, guarded, *more, **options)
 
     def create_subscription(
@@ -386,7 +391,9 @@ class ExecutorNode(LifecycleNode):
         self._rules.beat()
         self._lost_supervisors.look()
         self._state.look_for_hung()
-        self._diagnostics.publish(error=self._state.error)
+        if step := self._wall_clock.look():
+            self.get_logger().warning(step)
+        self._diagnostics.publish(error=self._state.error, clock=self._wall_clock.recent())
         self._topic_watch.look(self._bound.topics(), self._bound.other_types())
         self._recording.look()
         self._name_watch.look()

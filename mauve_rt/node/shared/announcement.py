@@ -1,4 +1,4 @@
-"""The first DDS participant of a program: it keeps its shared memory to itself, and gets every answer.
+"""The first DDS participant of a program: its waits, its shared memory, and how it gets every answer.
 
 A participant of Fast DDS announces itself to one port of 127.0.0.1 after another, and receives only then. An
 answer that comes before is lost, and the next announcement of the other participant comes up to 3 s later.
@@ -29,7 +29,12 @@ def first_participant() -> Iterator[None]:
     Other accounts cannot read its files in /dev/shm: they hold the messages. Other accounts cannot use shared
     memory anyway, which they would have to write. The announcement changes only where the program stays on
     this machine by its own profile. No other thread may read the environment meanwhile.
+
+    Fast DDS waits by the monotonic clock: a step of the wall clock holds up no message and no service.
     """
+    from mauve_rt._bridge import wait_by_the_monotonic_clock  # noqa: PLC0415 - loads libraries of ROS
+
+    wait_by_the_monotonic_clock()
     with ExitStack() as stack:
         if has_own_profile():
             own = os.environ[PROFILES]

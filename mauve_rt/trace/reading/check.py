@@ -118,7 +118,7 @@ def _missing(state: BagState, ledger: Mapping[str, Entry]) -> Iterator[str]:
 
 
 def _notes(trace: Trace) -> list[Finding]:
-    notes = []
+    notes = [Finding(step.text) for step in trace.clock_steps]
     for name, rows in trace.records.items():
         unknown = np.setdiff1d(rows["kind"], [int(kind) for kind in Kind])
         if len(unknown):

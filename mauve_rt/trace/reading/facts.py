@@ -1,6 +1,7 @@
 """What a bag tells besides records: grids, losses, files, messages of other topics."""
 
 from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -69,6 +70,25 @@ class TracedDecision(NamedTuple):
     """Its condition is as it is since then."""
     why: str
     """Why nothing was done or it failed; empty where there is nothing to tell."""
+
+
+class ClockStep(NamedTuple):
+    """CLOCK_REALTIME was set, or went on while the machine was suspended."""
+
+    realtime_ns: int
+    """When it was noticed, by the clock before."""
+    step_ns: int
+    """Negative: it was set back."""
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        at = datetime.fromtimestamp(self.realtime_ns / 1e9, UTC).isoformat(timespec="seconds")
+        if self.step_ns > 0:
+            how = f"was set forward by {self.step_ns / 1e9:.1f} s (or the machine was suspended)"
+        else:
+            how = f"was set back by {-self.step_ns / 1e9:.1f} s"
+        return f"the clock {how} at {at} of the time before: publish times and stamps jump there"
 
 
 class Message(NamedTuple):

@@ -13,7 +13,15 @@ from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.kinds import RecordKind, kinds_known
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.architecture import ComponentInfo
-from mauve_rt.trace.reading.facts import BagFile, Deployment, Loss, Message, MessageSource, TracedDecision
+from mauve_rt.trace.reading.facts import (
+    BagFile,
+    ClockStep,
+    Deployment,
+    Loss,
+    Message,
+    MessageSource,
+    TracedDecision,
+)
 from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:
@@ -21,6 +29,7 @@ if TYPE_CHECKING:
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
 
+_CLOCK_STEP_NS = 500_000_000  # a clock that is slewed gains at most 0.5 ms in a second
 _SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this
 
 
@@ -60,6 +69,16 @@ class Trace:
     def lost(self) -> int:
         """Records known to be lost, of all components."""
         return sum(loss.lost for loss in self.losses.values())
+
+    @property
+    def clock_steps(self) -> list[ClockStep]:
+        """Steps of CLOCK_REALTIME against CLOCK_MONOTONIC, by time; of one executor's trace only."""
+        pairs = self.clock_pairs[np.argsort(self.clock_pairs[:, 0], kind="stable")]
+        steps_ns = np.diff(pairs[:, 1] - pairs[:, 0])
+        return [
+            ClockStep(int(pairs[at + 1, 1] - steps_ns[at]), int(steps_ns[at]))
+            for at in np.flatnonzero(np.abs(steps_ns) >= _CLOCK_STEP_NS)
+        ]
 
     @property
     def span_ns(self) -> tuple[int, int]:

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
+from rosbags.highlevel import AnyReader
 
 import mauve_rt.trace
 from mauve_rt.cli.main import main
@@ -18,6 +19,7 @@ from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import all_statistics
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import TraceBag
 
 
 @pytest.fixture
@@ -56,6 +58,31 @@ def test_info(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFix
         "type": "mauve_msgs/msg/TraceNames",
         "messages": 1,
     }
+
+
+@pytest.mark.parametrize(("by_s", "how"), [(-60, "set back by 60.0 s"), (60, "set forward by 60.0 s (or")])
+def test_a_step_of_the_clock_is_reported(
+    source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str], by_s: int, how: str
+):
+    bag = TraceBag(source, tmp_path / "bag", node_name="/robot/executor", on_error=pytest.fail)
+    begin_ns = source.now_ns
+    for number in range(4):
+        if number == 2:
+            source.realtime_offset_ns += by_s * 10**9
+        source.now_ns = begin_ns + number * 10**9
+        bag.write(source.drain_trace(), [], whole=True)
+    bag.close()
+    assert main(["trace", "check", str(tmp_path / "bag")]) == 0
+    shown = capsys.readouterr().out
+    assert shown.count("note: the clock was set") == 1
+    assert how in shown
+    assert " at 2023-11-14T22:13:22+00:00 of the time before" in shown
+    assert main(["trace", "info", str(tmp_path / "bag")]) == 0
+    assert how in " ".join(capsys.readouterr().out.split())
+    with AnyReader([tmp_path / "bag"]) as reader:
+        assert reader.end_time - 1 - reader.start_time == (3 + max(by_s, 0)) * 10**9  # log times are in order
+    times_ns = [step.realtime_ns for step in mauve_rt.trace.open(tmp_path / "bag").clock_steps]
+    assert times_ns == [begin_ns + 2 * 10**9 + 1_700_000_000 * 10**9]
 
 
 def test_stats(source: SyntheticSource, tmp_path: Path, capsys: pytest.CaptureFixture[str]):

@@ -6,8 +6,9 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import pytest
@@ -18,6 +19,7 @@ from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Bool, Float64
+from stepped_clock import SteppedClock
 
 from mauve_msgs.msg import ArchitectureState, SupervisorDecision
 from mauve_rt.parts.ament_index import share_folder
@@ -39,8 +41,10 @@ LASTING_S = 2.0  # longer than the rule waits for anything
 class Band:
     """A metronome under an executor, its supervisor, and a peer that plays while `playing`."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, environment: Mapping[str, str] = MappingProxyType({})) -> None:
+        """`environment`: of executor and supervisors."""
         self.domain = draw_domain()
+        self.environment = environment
         self.playing = True
         self.folder = folder
         self.decisions: list[Any] = []
@@ -99,7 +103,7 @@ class Band:
             ],
             stderr=subprocess.PIPE,
             text=True,
-            env=os.environ | {"ROS_DOMAIN_ID": str(self.domain)},
+            env={**os.environ, "ROS_DOMAIN_ID": str(self.domain), **self.environment},
         )
 
     def until(self, condition: Callable[[], bool]) -> None:
@@ -107,6 +111,16 @@ class Band:
         while not condition():
             assert time.monotonic() < deadline_s, f"it did not happen; decisions: {self.said()}"
             self.spinner.spin_once(timeout_sec=0.1)
+
+    def await_rest(self) -> None:
+        """The peer is heard: the rule is armed, and decides nothing for longer than it waits for anything."""
+        told, since_s = -1, 0.0
+        deadline_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < since_s + 2 * LASTING_S:
+            assert time.monotonic() < deadline_s, f"no rest; decisions: {self.said()}"
+            self.spinner.spin_once(timeout_sec=0.1)
+            if len(self.decisions) != told or self.core() != "mauve_examples/Metronome":
+                told, since_s = len(self.decisions), time.monotonic()
 
     def said(self) -> list[str]:
         return [decision.decision for decision in self.decisions]
@@ -142,6 +156,18 @@ class Band:
 
 
 @pytest.fixture
+def stepped_clock(tmp_path: Path) -> SteppedClock:
+    return SteppedClock(tmp_path)
+
+
+@pytest.fixture
+def stepped_band(tmp_path: Path, stepped_clock: SteppedClock) -> Iterator[Band]:
+    band = Band(tmp_path, stepped_clock.environment)
+    yield band
+    band.close()
+
+
+@pytest.fixture
 def band(tmp_path: Path) -> Iterator[Band]:
     band = Band(tmp_path)
     yield band
@@ -158,6 +184,37 @@ def test_a_core_is_replaced_in_flight_and_back(band: Band):
     band.until(lambda: band.core() == "mauve_examples/Metronome")
     swapped = [decision for decision in band.decisions if decision.decision == "done"]
     assert swapped[-1].revision == band.states[-1].revision
+
+
+@pytest.mark.parametrize("step_s", [-600, 600])  # longer than the test waits for anything
+def test_a_step_of_the_clock_is_no_silence(stepped_band: Band, stepped_clock: SteppedClock, step_s: int):
+    band = stepped_band
+    band.await_rest()
+    told = len(band.decisions)
+    stepped_clock.step(step_s)
+    band.await_rest()
+    assert len(band.decisions) == told
+    band.playing = False
+    band.until(lambda: band.said()[-1:] == ["done"])
+    band.until(lambda: band.core() == "mauve_examples/Accelerando")
+    band.playing = True
+    band.until(lambda: band.said()[-2:] == ["undo", "done"])
+    band.end_supervisor()
+    assert band.supervisor_process.returncode == 0
+
+
+def test_a_supervisor_without_input_ends_after_a_step_of_the_clock(
+    stepped_band: Band, stepped_clock: SteppedClock
+):
+    band = stepped_band
+    band.until(lambda: "armed" in band.said())
+    band.playing = False
+    band.executor_process.kill()
+    band.executor_process.communicate()
+    time.sleep(LASTING_S)  # it waits, for nothing comes any longer
+    stepped_clock.step(-600)
+    band.end_supervisor()
+    assert band.supervisor_process.returncode == 0
 
 
 def test_an_executor_that_is_killed_and_started_anew_is_supervised_again(band: Band):
