@@ -353,8 +353,12 @@ bool Task::end_slot(Participant& participant) noexcept {
   const bool was_started = machine_.is_started();
   participant.parked_ns = clock().now_ns();
   participant.pending_ns = was_started ? due_ns() : 0;
+  // Its outputs are not written yet: whoever stops it by force, and the watchdog, do so where a take hangs.
+  const bool is_watched =
+      was_started && machine_.begin_execution(participant.parked_ns, participant.limit_ns());
   commit.take(participant);
   note_taken(commit);
+  if (is_watched && !machine_.end_execution()) await_time_out();
   join_new_epoch(participant);
   participant.armed_ns = participant.resumes_ns = machine_.look_at_clock();
   participant.released.store(Participant::kSuperseded,

@@ -187,6 +187,7 @@ void Task::tell_over_declared() noexcept {
 void Task::end_in_fault() noexcept {
   const bool is_violation = note_fault_on_probation();
   const bool has_new_parts = settle_slot();
+  if (machine_.execution().has_timed_out()) return park_timed_out();  // in the take of new parts
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
   if (is_violation && put_back_after_fault(has_new_parts)) return;
   write_outputs(false);

@@ -50,6 +50,7 @@ class Rule10Commit : public Deployed {
   ~Rule10Commit() override {
     latch.open();
     fast_may_agree.open();
+    take_may_end.open();
     deployer.shutdown();
     if (requester.joinable()) requester.join();
   }
@@ -107,6 +108,27 @@ class Rule10Commit : public Deployed {
     fast_may_agree.open();
     wait_until([&] { return fast_has_taken.load(); }, "fast's new core");
   }
+  Transaction with_a_take_that_waits(time_ns_t declared = 0) {
+    auto fresh = std::make_unique<ToldCore>();
+    fresh->declared = declared;
+    fresh->taking = [this] { take_may_end.wait(); };
+    Transaction both = replace("fast", core_that_waits());
+    both.replace_core("slow", std::move(fresh));
+    return both;
+  }
+  void reach_the_take() {
+    latch.open();
+    wait_until([&] { return take_may_end.reached(); }, "the take");
+  }
+  void expect_given_up_in_its_take() {
+    wait_until([&] { return slow->task().is_left_behind(); }, "the watchdog");
+    EXPECT_EQ(ComponentState::faulted, slow->task().state());
+    wait_ended();
+    EXPECT_FALSE(error) << error->what();
+    take_may_end.open();
+    wait_until([&] { return slow->task().is_parked(); }, "its thread");
+    EXPECT_EQ(ComponentState::faulted, slow->task().state());
+  }
   double gain_of_slow() const { return slow->shell_as<TestShell>().gain.value(); }
   /// On a thread of its own; `error` is what it ended with.
   void request(Transaction transaction, const TransactionOptions& options = {}) {
@@ -143,6 +165,7 @@ class Rule10Commit : public Deployed {
   std::atomic<bool> fast_has_agreed{false};
   std::atomic<bool> fast_has_taken{false};
   Latch fast_may_agree;
+  Latch take_may_end;
   std::function<void()> prepare = [] {};
   std::function<void()> at_the_end_of_slow = [] {};
   std::thread requester;
@@ -450,6 +473,24 @@ TEST_F(Rule10Commit, ALateOneThatFaultsHasTheNewParts) {
   wait_ended();
   EXPECT_FALSE(error) << error->what();
   EXPECT_EQ(2.0, gain_of_slow());
+}
+
+/// It takes the change before it writes its safe outputs.
+TEST_F(Rule10Commit, ALateOneThatHangsInATakeOnItsWayIntoAStopIsGivenUp) {
+  deploy_two();
+  make_it_late(with_a_take_that_waits());
+  EXPECT_THROW(deployer.stop("slow", 0), Error) << "it stays pending";
+  reach_the_take();
+  EXPECT_TRUE(deployer.stop("slow", {.timeout_ns = 0, .force = true})) << "nobody declared how long it may last";
+  expect_given_up_in_its_take();
+}
+
+TEST_F(Rule10Commit, ALateOneThatHangsInATakeAfterAFaultIsGivenUp) {
+  deploy_two();
+  make_it_late(with_a_take_that_waits(us_to_ns(100)));
+  broken = true;
+  reach_the_take();
+  expect_given_up_in_its_take();
 }
 
 TEST_F(Rule10Commit, ALateOneThatHangsCanBeRemovedByForce) {
