@@ -286,9 +286,10 @@ Raises:
     MauveError: there is no such resource, or it is none to serve.)")
       .def("close", py::overload_cast<const std::vector<std::size_t>&>(&Bridge::close), py::arg("numbers"),
            Unlocked(), "End these; what was written before is sent.")
-      .def("listen_for_silence", &Bridge::listen_for_silence, py::arg("resources"),
-           py::arg("links"), Unlocked(),
-           R"(Report that nothing waits to be written to these resources, and of those of `links` also arrivals.
+      .def(
+          "listen_for_silence", &Bridge::listen_for_silence, py::arg("resources"), py::arg("links"),
+          Unlocked(),
+          R"(Report that nothing waits to be written to these resources, and of those of `links` also arrivals.
 
 A reliable topic of `links` gets a best-effort subscription, too: there a lost message holds up no later one.
 

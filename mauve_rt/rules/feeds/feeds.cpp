@@ -48,8 +48,7 @@ void Feeds::open(const SignalSpec& spec, Signal& signal) {
       feeds_[&signal] = open_write_feed(spec.target, Heard::writes, signal, place_);
       return;
     case SignalKind::arrival:
-      feeds_[&signal] =
-          open_write_feed(resource_of(spec.target), Heard::writes_and_arrivals, signal, place_);
+      feeds_[&signal] = open_write_feed(resource_of(spec.target), Heard::writes_and_arrivals, signal, place_);
       return;
     case SignalKind::field: {
       const auto topic = place_.topics.find(spec.target);

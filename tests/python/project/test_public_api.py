@@ -18,7 +18,13 @@ OTHERS = re.findall(r"`(mauve_rt\.[\w.]+\.\w+)`", TEXT[TEXT.index("Of other modu
 
 
 def test_the_lists_are_found():
-    assert list(LISTED) == ["mauve_rt", "mauve_rt.api", "mauve_rt.driver", "mauve_rt.trace", "mauve_rt.trace.report"]
+    assert list(LISTED) == [
+        "mauve_rt",
+        "mauve_rt.api",
+        "mauve_rt.driver",
+        "mauve_rt.trace",
+        "mauve_rt.trace.report",
+    ]
     assert OTHERS
 
 

@@ -39,7 +39,7 @@ class CommandWatch {
     if (timeout <= Duration::zero()) throw std::invalid_argument("CommandWatch: expected a timeout above 0");
   }
 
-  /// A command has come now. [rt] One thread.
+  /// A command has come now. [rt] as far as the clock is. One thread.
   void received(const Command& command) noexcept {
     const std::uint64_t next = count_.load(std::memory_order_relaxed) + 1;  // relaxed: written here only
     Place& place = places_[next % kPlaces];
@@ -52,17 +52,17 @@ class CommandWatch {
     count_.store(next, std::memory_order_release);
   }
 
-  /// What to do now. [rt]
+  /// What to do now. [rt] as far as the clock is.
   Command value() const noexcept {
     const Last last = newest();
     return last.is_there && last.age < timeout_ ? last.command : safe_;
   }
-  /// Whether that is the safe command for want of a fresh one. [rt]
+  /// Whether that is the safe command for want of a fresh one. [rt] as far as the clock is.
   bool is_safe() const noexcept {
     const Last last = newest();
     return !last.is_there || last.age >= timeout_;
   }
-  /// Time since the last command; the largest there is before the first one. [rt]
+  /// Time since the last command; the largest there is before the first one. [rt] as far as the clock is.
   Duration age() const noexcept {
     const Last last = newest();
     return last.is_there ? last.age : Duration::max();
