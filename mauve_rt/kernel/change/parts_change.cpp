@@ -178,6 +178,7 @@ void PartsChange::put_back() noexcept {
       component_.task_.give_up_place_for(component_.parts_.fsm->initial());
   }
   MAUVE_RT_TRUSTED(std::swap(binding_, component_.binding_));  // moves: nothing is allocated, nothing freed
+  component_.has_ready_core_.store(true, std::memory_order_relaxed);
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
 }
@@ -199,6 +200,7 @@ void PartsChange::take() noexcept {
   }
   if (replaces_fsm()) exchange_fsm();
   std::swap(binding_, component_.binding_);
+  component_.has_ready_core_.store(!unready_, std::memory_order_relaxed);
   taken_ = true;
   if (unready_) return;
   if (parts_.fsm != nullptr)

@@ -252,10 +252,15 @@ void Component::require_parked(const std::string& what) const {
                .remedy = "stop it first, or replace the core in flight"});
 }
 
+void Component::unbind_core() noexcept {
+  has_ready_core_.store(false, std::memory_order_relaxed);
+  binding_ = {};
+}
+
 void Component::cleanup_core() {
   const auto change = join_change();
   require_parked("cleanup_core");
-  binding_ = {};
+  unbind_core();
   parts_.core->cleanup();
 }
 
@@ -267,6 +272,7 @@ void Component::configure_core() {
   const auto change = join_change();
   require_parked("configure_core");
   bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
+  has_ready_core_.store(true, std::memory_order_relaxed);
   if (task_.has_thread()) prefault_allocated();
 }
 
@@ -295,7 +301,7 @@ CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const
 }
 
 void Component::require_ready_core() const {
-  if (!is_configured() || binding_.is_ready()) return;
+  if (!is_configured() || has_ready_core_.load(std::memory_order_relaxed)) return;
   throw Error(ErrorCode::not_configured, "the core is not configured",
               {.component = name_,
                .element = parts_.core->description(),
@@ -445,6 +451,7 @@ bool Component::configure_hook() {
     require_declared_states(*parts_.fsm);
     period_ns = settled_period_ns(*parts_.fsm);
     bind_and_configure(*parts_.core, *parts_.shell, *parts_.fsm, binding_);
+    has_ready_core_.store(true, std::memory_order_relaxed);
     prepare_fallback();
   } catch (const Error& failure) {
     cleanup_hook();
@@ -502,7 +509,7 @@ void Component::check_cleanup() const {
 }
 
 std::unique_ptr<CoreBase> Component::release_core() noexcept {
-  binding_ = {};
+  unbind_core();
   return std::move(parts_.core);
 }
 
@@ -528,7 +535,7 @@ void Component::cleanup_hook() {
     fallback_core_->cleanup();
     if (is_replaced) fallback_core_.reset();
   }
-  binding_ = {};
+  unbind_core();
   if (parts_.core != nullptr) parts_.core->cleanup();  // else release_core()
   parts_.fsm->cleanup();
   parts_.shell->cleanup();

@@ -184,10 +184,10 @@ void Task::tell_over_declared() noexcept {
       [&](TaskListener& listener) { listener.on_over_declared(machine_.clock().now_ns()); });
 }
 
-void Task::end_in_fault() noexcept {
+void Task::end_in_fault(bool has_taken_change) noexcept {
   const bool is_violation = note_fault_on_probation();
-  const bool has_new_parts = settle_slot();
-  if (machine_.execution().has_timed_out()) return park_timed_out();  // in the take of new parts
+  const bool has_new_parts = settle_slot() || has_taken_change;
+  if (machine_.execution().has_timed_out()) return park_timed_out(has_new_parts);  // in the take of new parts
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
   if (is_violation && put_back_after_fault(has_new_parts)) return;
   write_outputs(false);

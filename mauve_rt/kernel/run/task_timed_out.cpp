@@ -111,11 +111,11 @@ void Task::abandon() noexcept {
 }
 
 /// The thread's way out of an execution that timed out.
-void Task::park_timed_out() noexcept {
+void Task::park_timed_out(bool has_taken_change) noexcept {
   if (machine_.execution().come_back()) {
     time_out_note_ = {};
     take_back_outputs();
-    return end_in_fault();
+    return end_in_fault(has_taken_change);
   }
   machine_.park();  // removed meanwhile: kExit is set, and nobody is to hear of it
   parked_.store(1, std::memory_order_release);

@@ -25,7 +25,7 @@ namespace mauve::driver {
 /// | member | written by   | read by | order                                                                             |
 /// | ------ | ------------ | ------- | --------------------------------------------------------------------------------- |
 /// | count_ | the receiver | anyone  | release/acquire: who sees a number sees its place whole                           |
-/// | places_ | the receiver | anyone | relaxed, between fences: who reads a word of a later command sees a later count_  |
+/// | places_ | the receiver | anyone | release/acquire: who reads a word of a later command sees a later count_, too     |
 template <typename Command, typename Clock = std::chrono::steady_clock>
 class CommandWatch {
   static_assert(std::is_trivially_copyable_v<Command>, "a command is copied word by word");
@@ -45,10 +45,8 @@ class CommandWatch {
     Place& place = places_[next % kPlaces];
     Words words{};
     std::memcpy(words.data(), &command, sizeof(Command));
-    // release: who reads a word that follows also sees the count of the command before
-    std::atomic_thread_fence(std::memory_order_release);
-    for (std::size_t i = 0; i < kWords; ++i) place.words[i].store(words[i], std::memory_order_relaxed);
-    place.received.store(Clock::now().time_since_epoch().count(), std::memory_order_relaxed);
+    for (std::size_t i = 0; i < kWords; ++i) place.words[i].store(words[i], std::memory_order_release);
+    place.received.store(Clock::now().time_since_epoch().count(), std::memory_order_release);
     count_.store(next, std::memory_order_release);
   }
 
@@ -88,10 +86,9 @@ class CommandWatch {
       if (count == 0) return {.is_there = false, .command = safe_, .age = {}};
       const Place& place = places_[count % kPlaces];
       Words words{};
-      for (std::size_t i = 0; i < kWords; ++i) words[i] = place.words[i].load(std::memory_order_relaxed);
-      const Duration received(place.received.load(std::memory_order_relaxed));
-      // acquire: where a word was of a later command, the count that follows shows it
-      std::atomic_thread_fence(std::memory_order_acquire);
+      for (std::size_t i = 0; i < kWords; ++i) words[i] = place.words[i].load(std::memory_order_acquire);
+      const Duration received(place.received.load(std::memory_order_acquire));
+      // relaxed: where a word was of a later command, its acquire shows the count before that one
       if (count_.load(std::memory_order_relaxed) >= count + kPlaces - 1) continue;
       Last last{.is_there = true, .command = safe_, .age = Clock::now().time_since_epoch() - received};
       std::memcpy(&last.command, words.data(), sizeof(Command));

@@ -207,6 +207,7 @@ struct ShownParts {
 /// | ---------------- | ----------------------------------------- | ------------------- | ---------------- |
 /// | parts_, binding_ | commanders, parked; commits; a fallback   | the task            | parking, commits |
 /// | present_shell_, present_core_, present_fsm_ | with parts_    | anyone              | release/acquire: the part's contents |
+/// | has_ready_core_  | with binding_                             | anyone              | relaxed: a lone fact |
 /// | wires_           | changes, as they are made                 | ordinary threads    | the gate's mutex |
 /// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
@@ -366,6 +367,7 @@ class Component final : public Configurable {
   }
   /// Gives away the core of one that was added by a change that is not made: nothing but its end follows. [non-rt]
   std::unique_ptr<CoreBase> release_core() noexcept;
+  void unbind_core() noexcept;
   /// Ends the present probation, inconclusive; settle_probation() retires its parts. [non-rt]
   void conclude_probation() noexcept;
 
@@ -449,6 +451,7 @@ class Component final : public Configurable {
   Atomic<CoreBase*> present_core_{nullptr};
   Atomic<const FsmBase*> present_fsm_{nullptr};
   CoreBinding binding_;
+  Atomic<bool> has_ready_core_{false};  // whether binding_ is of a configured core
   std::string declared_core_;
   std::vector<std::string> alternatives_;
   bool reconfigurable_{true};

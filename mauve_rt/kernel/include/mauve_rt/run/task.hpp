@@ -418,8 +418,8 @@ class Task final : public Waiter {
   void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
-  void park_timed_out() noexcept;
-  void end_in_fault() noexcept;
+  void park_timed_out(bool has_taken_change = false) noexcept;
+  void end_in_fault(bool has_taken_change = false) noexcept;
   void park(ComponentState state) noexcept;
   bool time_out(const ExecutionWord::Look& execution, std::string what, time_ns_t now_ns);
   bool time_out_unless_waiting();
