@@ -94,11 +94,14 @@ def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
+    from mauve_rt.supervision.drivers import unbounded_outputs  # noqa: PLC0415
     from mauve_rt.supervision.rule_findings import all_findings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
 
     file = RulesFile(path)
     found = all_findings(file, model)
+    if model is not None:
+        found += unbounded_outputs(file, model)
     if found:
         raise ArchitectureFileError(path, found)
     print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")

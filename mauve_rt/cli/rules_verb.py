@@ -48,6 +48,7 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
 
 def _check(args: argparse.Namespace) -> int:
     from mauve_rt.model import load_architecture  # noqa: PLC0415
+    from mauve_rt.supervision.drivers import unbounded_outputs  # noqa: PLC0415
     from mauve_rt.supervision.rule_cautions import form_warnings, model_warnings  # noqa: PLC0415
     from mauve_rt.supervision.rule_checks import logic_findings  # noqa: PLC0415
     from mauve_rt.supervision.rule_findings import standing_findings  # noqa: PLC0415
@@ -61,7 +62,7 @@ def _check(args: argparse.Namespace) -> int:
     if model is not None:
         from mauve_rt.supervision.rehearsal import rehearsal, rehearsal_problems  # noqa: PLC0415
 
-        found += rehearsal_problems(file, model)
+        found += [*rehearsal_problems(file, model), *unbounded_outputs(file, model)]
         with rehearsal(model) as executor:
             periods = executor.periods_s()
             warnings += model_warnings(file, model, executor)

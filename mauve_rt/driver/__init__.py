@@ -1,4 +1,4 @@
-"""For drivers: what a machine is told to do, and the safe value where no command comes. Needs no ROS."""
+"""For drivers: the last command, and the safe one where no command comes. Needs no ROS."""
 
 from mauve_rt.driver.command_watch import CommandWatch
 

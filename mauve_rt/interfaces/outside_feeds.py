@@ -11,6 +11,7 @@ from mauve_rt.supervision.peers import PEER_STATES, Peer, PeerState, executor_na
 from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rule_types import heard_type
 from mauve_rt.supervision.rules import RulesFile
+from mauve_rt.supervision.when_spec import OF_TOPICS
 
 DIAGNOSTICS = "/diagnostics"
 _FAULTED = next(number for number, name in STATES.items() if name == "FAULTED")
@@ -81,7 +82,7 @@ class OutsideFeeds:
         return self._peers
 
     def _open(self, file: RulesFile, number: int, spec: SignalSpec) -> None:
-        if spec.kind in ("message", "arrival", "field"):
+        if spec.kind in OF_TOPICS:
             leaf = self._types.get((spec.target, spec.detail))
             if leaf is not None:  # else it cannot be heard here, and the rules know that
                 hear = partial(self._hear, number, spec.detail)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from mauve_rt._kernel import RuleDecision
 from mauve_rt.supervision.decision_words import Name, reason_of
 from mauve_rt.supervision.rules import Rule
+from mauve_rt.supervision.when import SILENCES
 
 NO_SILENCE_S = -1.0  # of a condition that knows no silence
 _WITHOUT_ACT = ("armed", "condition_true", "condition_false", "condition_unknown")
@@ -44,7 +45,7 @@ def decision_of(
         decision=made.decision,
         reason=reason or reason_of(made, rules, name=name, failure=failure),
         act="" if made.decision in _WITHOUT_ACT else made.act,
-        silence_s=made.measured if rule.when.kind in ("silence", "link_silence") else NO_SILENCE_S,
+        silence_s=made.measured if rule.when.kind in SILENCES else NO_SILENCE_S,
         measured=made.measured,
         revision=revision,
         message=message,

@@ -14,7 +14,7 @@ from mauve_rt.supervision.message_fields import field_value
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.supervision.when import When
-from mauve_rt.supervision.when_spec import heard
+from mauve_rt.supervision.when_spec import OF_TOPICS, heard
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.decisions import executors
 from mauve_rt.trace.reading.facts import Message
@@ -119,7 +119,7 @@ class RecordedSignals:
         """The full name of the topic that a signal is about; empty when it is about none."""
         if signal.kind == "diagnostic":
             return _DIAGNOSTICS
-        if signal.kind not in ("message", "arrival", "field"):
+        if signal.kind not in OF_TOPICS:
             return ""
         if signal.target.startswith("~/"):
             return f"{self._node}/{signal.target[2:]}"

@@ -2,7 +2,6 @@
 
 from mauve_rt.errors import Problem
 from mauve_rt.model import ArchitectureModel, PluginIndex
-from mauve_rt.supervision.drivers import unbounded_outputs
 from mauve_rt.supervision.rule_actions import unprepared
 from mauve_rt.supervision.rule_hearing import only_outside
 from mauve_rt.supervision.rule_names import name_findings
@@ -24,10 +23,9 @@ def all_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Probl
 
 
 def standing_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Problem]:
-    """Names that are not there, what cannot be heard or made ready, outputs that say nothing of drivers."""
+    """Names that are not there, and what who runs a rule can neither hear nor make ready."""
     plugins = PluginIndex.installed()
     steps = (
         problem for index in range(len(file.rules.rules)) for problem in unprepared(file, index, plugins)
     )
-    outputs = unbounded_outputs(file, model) if model is not None else ()
-    return [*name_findings(file, model), *only_outside(file), *steps, *outputs]
+    return [*name_findings(file, model), *only_outside(file), *steps]

@@ -28,13 +28,13 @@ from mauve_rt.model.words import did_you_mean, listed
 from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
-from mauve_rt.supervision.when_spec import heard
+from mauve_rt.supervision.when_spec import OF_TOPICS, heard
 
 LONGEST_S = 3600.0
 SHORTEST_PERIOD_S = 0.001
 # What each line may be about: the signals of the engine that it tells.
 _SIGNALS: Mapping[str, tuple[str, ...]] = {
-    "topic": ("message", "arrival", "field"),
+    "topic": OF_TOPICS,
     "resource": ("write", "field"),
     "overruns": ("overruns",),
     "late": ("late",),

@@ -7,7 +7,7 @@ from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.supervision.rule_names import full_name
 from mauve_rt.supervision.rules import RulesFile
-from mauve_rt.supervision.when import When
+from mauve_rt.supervision.when import SILENCES, When
 
 JITTER_S = 0.010
 """Assumed: threads of a busy machine are late by no more."""
@@ -22,7 +22,7 @@ def limit_warnings(
     """
     for rule in file.rules.rules:
         for leaf in rule.when.leaves():
-            if leaf.kind not in ("silence", "link_silence"):
+            if leaf.kind not in SILENCES:
                 continue
             limit_s = float(leaf.parameters["longer_than_s"])
             for writer, period_s in _writers(leaf, model, periods_s):

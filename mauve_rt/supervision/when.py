@@ -26,6 +26,8 @@ COMBINATIONS: Mapping[str, str] = {
     AT_LEAST: "at least `count` of the conditions of the list `of` hold",
 }
 """The combinations of conditions, and when each holds."""
+SILENCES = ("silence", "link_silence")
+"""Conditions that say for how long nothing came."""
 MOST_PARTS = 64  # of one combination
 _SECONDS = Real(above=0)
 TIMES: Mapping[str, str] = {

@@ -3,6 +3,9 @@
 from mauve_rt._kernel import MauveError, RuleEngine, RuleSpec, SignalSpec, WhenSpec
 from mauve_rt.supervision.when import When
 
+OF_TOPICS = ("message", "arrival", "field")
+"""Kinds of signals that messages of a topic feed."""
+
 
 def when_spec(when: When) -> WhenSpec:
     """A tree of conditions; what it was not told it is not told here either."""

@@ -37,3 +37,10 @@ def load(folder: Path, leaf: str, *, where: str = "executor") -> RulesFile:
         f"mauve: 1\nrules:\n  - name: one\n{BEFORE}{leaf}}}\n    {do}\n    in: {where}\n", encoding="utf-8"
     )
     return RulesFile(path)
+
+
+def driven(qos: str = "") -> str:
+    """The robot of the other tests, with an output on a topic."""
+    topic = f"{{name: motor, direction: publish{qos}}}"
+    out = f"  out: {{kind: shared_data, type: std_msgs/msg/Float64, topic: {topic}}}\n"
+    return ROBOT.replace("connections:\n", f"{out}connections:\n  - [one.count, out.write]\n")

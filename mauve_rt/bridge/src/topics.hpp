@@ -137,8 +137,7 @@ class IncomingTopic final : public BoundTopic, private Arrival {
   const TopicSettings settings_;
   Owned<rcl_subscription_t, rcl_subscription_fini> subscription_;
   OwnedMessage message_;
-  std::unique_ptr<ArrivalTwin>
-      twin_;  // while rules listen for silence of the link, of a reliable subscription
+  std::unique_ptr<ArrivalTwin> twin_;  // while silence_ is of_link, of a reliable subscription
   Silence silence_{Silence::none};
   std::size_t place_{0};  // in the wait set
   TopicEvents events_;    // end before the entity that they are of

@@ -353,7 +353,7 @@ bool Task::end_slot(Participant& participant) noexcept {
   const bool was_started = machine_.is_started();
   participant.parked_ns = clock().now_ns();
   participant.pending_ns = was_started ? due_ns() : 0;
-  // Its outputs are not written yet: whoever stops it by force, and the watchdog, do so where a take hangs.
+  // Its outputs are not written yet: where a take hangs, a stop by force or the watchdog writes them.
   const bool is_watched =
       was_started && machine_.begin_execution(participant.parked_ns, participant.limit_ns());
   commit.take(participant);

@@ -481,8 +481,7 @@ TEST_F(Rule10Commit, ALateOneThatHangsInATakeOnItsWayIntoAStopIsGivenUp) {
   make_it_late(with_a_take_that_waits());
   EXPECT_THROW(deployer.stop("slow", 0), Error) << "it stays pending";
   reach_the_take();
-  EXPECT_TRUE(deployer.stop("slow", {.timeout_ns = 0, .force = true}))
-      << "nobody declared how long it may last";
+  EXPECT_TRUE(deployer.stop("slow", {.timeout_ns = 0, .force = true})) << "its core declares no budget";
   expect_given_up_in_its_take();
 }
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from checked_rules import QUIET, ROBOT, rule
+from checked_rules import QUIET, ROBOT, driven, rule
 
 from mauve_rt.cli.main import main
 
@@ -61,6 +61,16 @@ def test_the_executor_of_an_architecture_acts(play: Try, where: str) -> None:
     status, out, error = play(rules, QUIET_SCRIPT, robot=ROBOT)
     assert (status, error) == (0, "")
     assert "2.000 s  quiet: done: do: replace_core one executor_tests/Backwards" in out
+
+
+@pytest.mark.usefixtures("plugin_prefix")
+def test_a_safety_rule_is_tried_as_an_executor_takes_it(play: Try) -> None:
+    """What `mauve check` demands of its driver is no refusal of the executor."""
+    safety = "    safety: true\n    otherwise: stop\n    in: executor\n"
+    rules = "mauve: 1\nrules:\n" + rule(undo="    undo: {for_s: 1.0}\n", more=safety)
+    status, out, err = play(rules, QUIET_SCRIPT, robot=driven())
+    assert (status, err) == (0, "")
+    assert "quiet: done" in out
 
 
 @pytest.mark.usefixtures("plugin_prefix")

@@ -1,18 +1,11 @@
 """`mauve rules check`: warnings about rules that an executor takes."""
 
 import pytest
-from checked_rules import QUIET, ROBOT, UNDO, Check, rule
+from checked_rules import QUIET, ROBOT, UNDO, Check, driven, rule
 
 SAFETY = "    safety: true\n    otherwise: stop\n"
 ABOVE = "{value: {topic: set_point, type: std_msgs/msg/Float64, field: data, above: 1.0}}"
 BACK = "    undo: {for_s: 1.0}\n"
-
-
-def driven(qos: str = "") -> str:
-    """The robot of the other tests, with an output on a topic."""
-    topic = f"{{name: motor, direction: publish{qos}}}"
-    out = f"  out: {{kind: shared_data, type: std_msgs/msg/Float64, topic: {topic}}}\n"
-    return ROBOT.replace("connections:\n", f"{out}connections:\n  - [one.count, out.write]\n")
 
 
 def test_a_latched_rule_that_is_no_safety_rule(check: Check) -> None:

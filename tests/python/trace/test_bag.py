@@ -28,13 +28,7 @@ T0 = 1_700_000_000_000_000_000
 TEXT = "mauve_test_msgs/msg/Text"
 
 
-@pytest.fixture(autouse=True)
-def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    share = tmp_path / "prefix" / "share" / "mauve_test_msgs" / "msg"
-    share.mkdir(parents=True)
-    (share / "Text.msg").write_text("string data\n")
-    (share / "Number.msg").write_text("uint32 data\n")
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+pytestmark = pytest.mark.usefixtures("test_messages")
 
 
 def text(number: int):

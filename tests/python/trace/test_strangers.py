@@ -27,12 +27,7 @@ LARGE = 8_000_000  # bytes
 Counts = Counter[str]
 
 
-@pytest.fixture(autouse=True)
-def installed_messages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    share = tmp_path / "prefix" / "share" / "mauve_test_msgs" / "msg"
-    share.mkdir(parents=True)
-    (share / "Text.msg").write_text("string data\n")
-    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "prefix"))
+pytestmark = pytest.mark.usefixtures("test_messages")
 
 
 # ---- the bags

@@ -12,10 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from needed_hosts import hosts_or_skip
 from ros_processes import PATIENCE_S, RELAY, ExecutorProcess
 from udp_sockets import udp_sockets
 
-from mauve_examples.mission.hosts import ADDRESS, Hosts, HostsError
+from mauve_examples.mission.hosts import ADDRESS, Hosts
 
 ROBOT, ELSEWHERE = f"{ADDRESS}1", f"{ADDRESS}2"
 RANGE = "ROS_AUTOMATIC_DISCOVERY_RANGE"
@@ -77,10 +78,8 @@ class Robot:
 
 @pytest.fixture
 def robot(tmp_path: Path, domain: int) -> Iterator[Robot]:
-    try:
+    with hosts_or_skip():
         made = Robot(tmp_path, domain)
-    except HostsError as error:
-        pytest.skip(str(error))
     yield made
     made.close()
 

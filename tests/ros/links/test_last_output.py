@@ -1,6 +1,5 @@
 """The last message that a listener on another machine gets of an executor that ends, over a lossy cable."""
 
-import json
 import os
 import signal
 import subprocess
@@ -11,10 +10,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from lossy_cable import LossyCable
+from needed_hosts import hosts_or_skip
 from ros_processes import ExecutorProcess
 from waiting import wait_until
 
-from mauve_examples.mission.hosts import Hosts, HostsError
+from mauve_examples.mission.hosts import Hosts
 
 RANGE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 LOSS = 0.25
@@ -46,7 +47,7 @@ rclpy.spin(node)
 
 
 class Machines:
-    """Two that a cable joins, which loses frames when it is told to."""
+    """Two that a lossy cable joins."""
 
     def __init__(self, folder: Path, domain: int) -> None:
         """Make them.
@@ -57,26 +58,7 @@ class Machines:
         self._folder = folder
         self._environment = {"ROS_DOMAIN_ID": str(domain), **RANGE}
         self._hosts = Hosts(["robot", "driver"])
-        wrapper, ports = self._hosts.take_off_switch()
-        program = str(Path(__file__).with_name("impaired_cable.py"))
-        self._cable = subprocess.Popen(
-            [*wrapper, sys.executable, program, *ports],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-        )
-        assert self._answer() == "ready"
-
-    def lose(self, share: float) -> None:
-        """From now on that share of the frames is lost."""
-        assert self._cable.stdin is not None
-        print(json.dumps({"loss": share}), file=self._cable.stdin)
-        assert self._answer() == "ok"
-
-    def _answer(self) -> str:
-        assert self._cable.stdout is not None
-        return self._cable.stdout.readline().strip()
+        self._cable = LossyCable(self._hosts)
 
     def values_of_an_end(self, qos: str, number: int) -> list[float]:
         """What the driver received of an executor, up to its last message."""
@@ -96,30 +78,27 @@ class Machines:
         )
         try:
             wait_until(lambda: len(received()) > 20)
-            self.lose(LOSS)
+            self._cable.set(loss=LOSS)
             time.sleep(0.3)
             assert executor.end(signal.SIGTERM)[0] == 0
             time.sleep(0.3)
             return received()
         finally:
-            self.lose(0.0)
+            self._cable.set()
             for process in (executor.process, driver):
                 process.kill()
                 process.wait()
 
     def close(self) -> None:
         """End all of it."""
-        self._cable.kill()
-        self._cable.wait()
+        self._cable.close()
         self._hosts.close()
 
 
 @pytest.fixture
 def machines(tmp_path: Path, domain: int) -> Iterator[Machines]:
-    try:
+    with hosts_or_skip():
         made = Machines(tmp_path, domain)
-    except HostsError as error:
-        pytest.skip(str(error))
     yield made
     made.close()
 

@@ -4,16 +4,12 @@ Each group of scenarios has a pair of robots of its own, on machines of their ow
 groups run at once, in threads, since they mostly wait. Asserted are order, counts and lower bounds.
 """
 
-import sys
 import threading
 from collections.abc import Iterator
 from concurrent.futures import Future
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # for scenarios
-
+from needed_hosts import hosts_or_skip
 from robots import SILENCE_S, UNDO_S, Pair
 from scenarios import ACTING, GROUPS, Outcome, Scenario, acted_as_expected, is_calm
 
@@ -39,10 +35,8 @@ def _play(pair: Pair, group: dict[str, Scenario], outcomes: dict[str, Future[Out
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, Future[Outcome]]]:
     """What came of each scenario, as soon as it is over."""
-    try:
+    with hosts_or_skip():
         Hosts([]).close()
-    except HostsError as error:
-        pytest.skip(str(error))
     futures: dict[str, Future[Outcome]] = {name: Future() for group in GROUPS for name in group}
     pairs = [Pair(tmp_path_factory.mktemp("pair")) for _ in GROUPS]
     threads = [

@@ -8,19 +8,18 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from needed_hosts import hosts_or_skip
 from ros_processes import PATIENCE_S, ExecutorProcess
 
-from mauve_examples.mission.hosts import ADDRESS, Hosts, HostsError
+from mauve_examples.mission.hosts import ADDRESS, Hosts
 from mauve_rt.cli.verb import BAD_USAGE
 from mauve_rt.parts.ament_index import share_folder
 
 
 @pytest.fixture
 def hosts() -> Iterator[Hosts]:
-    try:
+    with hosts_or_skip():
         made = Hosts(["robot", "desk"])
-    except HostsError as error:
-        pytest.skip(str(error))
     yield made
     made.close()
 

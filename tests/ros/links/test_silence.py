@@ -4,22 +4,18 @@ A talker of 10 Hz, a limit of 1 s, reliable delivery, which stands still for up 
 The link is a program of the test's, since netem and nftables may be missing. Asserted are order and counts.
 """
 
-import json
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # for listener
-
 from listener import Listener, Talker
+from lossy_cable import LossyCable
+from needed_hosts import hosts_or_skip
 
-from mauve_examples.mission.hosts import Hosts, HostsError
+from mauve_examples.mission.hosts import Hosts
 
 PERIOD_S, LIMIT_S, UNDO_S = 0.1, 1.0, 0.5
 EACH_S = 2.5
@@ -46,16 +42,7 @@ class Link:
             HostsError: no such machines can be made here.
         """
         self.hosts = Hosts(["robot_1", "robot_2"])
-        wrapper, ports = self.hosts.take_off_switch()
-        program = str(Path(__file__).with_name("impaired_cable.py"))
-        self._cable = subprocess.Popen(
-            [*wrapper, sys.executable, program, *ports],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-            bufsize=1,
-        )
-        assert self._answer() == "ready"
+        self.cable = LossyCable(self.hosts)
         self.talker = Talker(PERIOD_S, wrapper=self.hosts.wrapper("robot_2"), environment=_RANGE)
         self.listener = Listener(
             folder,
@@ -66,36 +53,23 @@ class Link:
             environment=_RANGE,
         )
 
-    def set(self, **settings: Any) -> None:
-        """How the cable differs from a perfect one."""
-        assert self._cable.stdin is not None
-        print(json.dumps(settings), file=self._cable.stdin)
-        assert self._answer() == "ok"
-
-    def _answer(self) -> str:
-        assert self._cable.stdout is not None
-        return self._cable.stdout.readline().strip()
-
     def calm(self) -> None:
         """Let all come back to rest."""
-        self.set()
+        self.cable.set()
         self.listener.until(self.listener.is_usual, "the way back")
 
     def close(self) -> None:
         """End all of it."""
         self.listener.close()
         self.talker.signal(signal.SIGKILL)
-        self._cable.kill()
-        self._cable.wait()
+        self.cable.close()
         self.hosts.close()
 
 
 @pytest.fixture(scope="module")
 def link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Link]:
-    try:
+    with hosts_or_skip():
         made = Link(tmp_path_factory.mktemp("link"))
-    except HostsError as error:
-        pytest.skip(str(error))
     made.listener.until(lambda: "armed" in made.listener.decisions(), "the rule to be armed")
     time.sleep(LIMIT_S)  # who does not hear the talker yet acts by then
     made.calm()
@@ -106,7 +80,7 @@ def link(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Link]:
 @pytest.mark.parametrize("name", BAD)
 def test_a_bad_link_is_no_silence(link: Link, name: str) -> None:
     before = link.listener.alarms()
-    link.set(**BAD[name])
+    link.cable.set(**BAD[name])
     time.sleep(EACH_S)
     link.calm()
     assert link.listener.alarms() == before, link.listener.executor.output
@@ -119,7 +93,7 @@ def _acts_once(link: Link, before: int) -> None:
 
 def test_a_cut_is_silence_until_it_is_mended(link: Link) -> None:
     before = link.listener.alarms()
-    link.set(up=False)
+    link.cable.set(up=False)
     _acts_once(link, before)
     link.calm()
     assert link.listener.alarms() == before + 1
@@ -128,7 +102,7 @@ def test_a_cut_is_silence_until_it_is_mended(link: Link) -> None:
 def test_a_flapping_link_that_is_never_down_for_long_is_no_silence(link: Link) -> None:
     before = link.listener.alarms()
     for up in (False, True) * 4:
-        link.set(up=up)
+        link.cable.set(up=up)
         time.sleep(0.3)
     link.calm()
     assert link.listener.alarms() == before, link.listener.executor.output

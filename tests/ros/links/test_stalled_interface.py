@@ -10,10 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from needed_hosts import hosts_or_skip
 from ros_processes import ExecutorProcess
 from waiting import wait_until
 
-from mauve_examples.mission.hosts import Hosts, HostsError
+from mauve_examples.mission.hosts import Hosts
 
 RANGE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 METRONOME = """\
@@ -96,10 +97,8 @@ def heard(file: Path, since_s: float = 0.0) -> list[float]:
 
 @pytest.fixture
 def robot(tmp_path: Path, domain: int) -> Iterator[Robot]:
-    try:
+    with hosts_or_skip():
         made = Robot(tmp_path, domain)
-    except HostsError as error:
-        pytest.skip(str(error))
     yield made
     made.close()
 

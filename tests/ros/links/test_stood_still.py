@@ -3,15 +3,11 @@
 import os
 import random
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))  # for listener
-
 from listener import Listener, Talker
 
 LIMIT_S, UNDO_S, PERIOD_S = 0.1, 0.1, 0.02

@@ -20,7 +20,7 @@ namespace mauve::driver {
 ///     // in the driver's own loop:  set_speed(watch.value());
 ///
 /// The age counts from the reception, by `Clock` of this computer: neither the sender's time nor a step of the wall clock counts.
-/// One thread receives, any number read; nobody waits for another thread. No exception, lock or memory after the construction.
+/// One thread receives, any number read; no thread waits for another. No exception, lock or memory after the construction.
 ///
 /// | member | written by   | read by | order                                                                             |
 /// | ------ | ------------ | ------- | --------------------------------------------------------------------------------- |
