@@ -4,7 +4,7 @@
 //   bench_shared_data [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0] [--other-cpu -1]
 // Prints for read and write of 16 and 4096 bytes {"read_16_ps": [...], "bare_read_16_ps": [...],
 // "hammered_read_16_ps": [...], "bare_hammered_read_16_ps": [...], ...} in picoseconds a call, then "copy_ps" and
-// "bare_copy_ps": 1 MiB written and read, next to two memcpy. Without another CPU, the names with "hammered" are absent.
+// "bare_copy_ps": 1 MiB written and read, next to two memcpy; "in_place_ps": the same in place, next to one. Without another CPU, the names with "hammered" are absent.
 #include <pthread.h>
 
 #include <cstring>
@@ -62,6 +62,8 @@ class Cell {
   }
   void write(const T& value) { output_.write(value); }
   void read(T& value) { input_.read(value); }
+  mauve::WritePort<T>& output() { return output_; }
+  mauve::ReadPort<T>& input() { return input_; }
 
  private:
   mauve::Context writing_;  // without one a port would read the clock to stamp
@@ -150,9 +152,22 @@ void measure_copies(const bench::Micro& micro, bench::JsonLine& line) {
       bench::keep(to[next]);
     }
   };
+  const auto in_place = [&](std::int64_t calls) {
+    for (std::int64_t i = 0; i < calls; ++i, next = (next + 1) % kBuffers) {
+      cell->output().write_with([&](Huge& place) { std::memcpy(&place, &from[next], sizeof(Huge)); });
+      cell->input().with([](const Huge& value) { bench::keep(value); });
+    }
+  };
+  const auto bare_in_place = [&](std::int64_t calls) {
+    for (std::int64_t i = 0; i < calls; ++i, next = (next + 1) % kBuffers) {
+      std::memcpy(&to[next], &from[next], sizeof(Huge));
+      bench::keep(to[next]);
+    }
+  };
   bench::Micro fewer = micro;
   fewer.calls = std::max<std::int64_t>(1, micro.calls / 64);
   fewer.compare(line, {{"copy", ours}, {"bare_copy", bare}});
+  fewer.compare(line, {{"in_place", in_place}, {"bare_in_place", bare_in_place}});
 }
 
 void measure(const bench::Options& options) {

@@ -43,6 +43,9 @@ def shared_data_rows(settings: Settings) -> Iterator[Row]:
             yield compared(what, pairs, unit="ns", beside=_COPY, ratio_limit=limit)
     what = "SharedData write and read, 1 MiB, on one thread"
     yield compared(what, _block_pairs(rounds, "copy", "bare_copy"), unit="ns", beside="two memcpy")
+    what = "SharedData write and read in place, 1 MiB, on one thread"
+    pairs = _block_pairs(rounds, "in_place", "bare_in_place")
+    yield compared(what, pairs, unit="ns", beside="one memcpy", ratio_limit=1.1)
 
 
 def ring_buffer_rows(settings: Settings) -> Iterator[Row]:

@@ -10,6 +10,11 @@ py::object to_python(const PropertyValue& value) {
 ResourceParameters parameters_of(const py::dict& keywords) {
   ResourceParameters parameters;
   for (const auto& [name, value] : keywords) {
+    if (py::isinstance<py::dict>(value)) {  // capacity={"ranges": 1081}
+      for (const auto& [key, inner] : parameters_of(value.cast<py::dict>()))
+        parameters.emplace(name.cast<std::string>() + "." + key, inner);
+      continue;
+    }
     try {
       parameters.emplace(name.cast<std::string>(), value.cast<PropertyValue>());
     } catch (const py::cast_error&) {
@@ -48,7 +53,8 @@ PropertyDescription describe_property(const ShownProperty& property) {
 
 ResourceDescription describe_resource(const Resource& resource) {
   ResourceDescription description{
-      resource.name(), resource.kind(), resource.type(), {}, resource.longest_hold_ns()};
+      resource.name(), resource.kind(), resource.type(), {}, resource.longest_hold_ns(),
+      resource.refused_values(), resource.why_refused_value()};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
                                     service->is_call_serializable(), service->messages(),
@@ -211,7 +217,11 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("type", &ResourceDescription::type)
       .def_readonly("services", &ResourceDescription::services)
       .def_readonly("longest_hold_ns", &ResourceDescription::longest_hold_ns,
-                    "For how long a user holds its lock; 0: not declared.");
+                    "For how long a user holds its lock; 0: not declared.")
+      .def_readonly("refused_values", &ResourceDescription::refused_values,
+                    "Values with a sequence that had more elements than the capacity.")
+      .def_readonly("why_refused_value", &ResourceDescription::why_refused_value,
+                    "The last of them, in words.");
   using E = ExecutionTimeDescription;
   py::class_<E>(module, "ExecutionTimeDescription",
                 "How long an execution state took since its machine was configured.")

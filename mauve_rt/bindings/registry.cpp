@@ -31,8 +31,9 @@ py::object instance_part(const py::object& resource) {
 }
 
 /// For a resource that is made only to be described.
-ResourceParameters parameters_needed(const ResourceKind& kind) {
+ResourceParameters parameters_needed(const ResourceKind& kind, const std::vector<std::string>& sequences) {
   ResourceParameters needed;
+  for (const std::string& path : sequences) needed.emplace("capacity." + path, std::int64_t{1});
   for (const ResourceParameter& parameter : kind.parameters) {
     if (parameter.is_required) needed.emplace(parameter.name, parameter.initial);
   }
@@ -231,8 +232,19 @@ Its actions run on the component's thread under the interpreter's lock.)")
            "kind: 'shell', 'core', 'fsm', 'resource', 'type'.")
       .def("resource_kind", &PluginRegistry::resource_kind, py::arg("name"), py::return_value_policy::copy,
            "Given, or registered.")
-      .def("value_bytes", &PluginRegistry::value_bytes, py::arg("type"),
-           "What a value of a registered data type takes, in bytes; 0 when it is none.")
+      .def(
+          "value_bytes",
+          [](const PluginRegistry& self, const std::string& type, const py::dict& parameters) {
+            ResourceParameters capacities = parameters_of(parameters);
+            std::erase_if(capacities, [](const auto& each) { return !is_capacity(each.first); });
+            return self.value_bytes(type, capacities);
+          },
+          py::arg("type"), py::arg("parameters") = py::dict(),
+          R"(What a value of a registered data type takes, in bytes, in a resource with such parameters.
+
+0 when the type is not registered.)")
+      .def("sequences", &PluginRegistry::sequences, py::arg("type"),
+           "The sequences of a registered data type, whose capacities its resources need, as `markers.points`.")
       .def(
           "describe_shell",
           [](const PluginRegistry& self, const std::string& name) {
@@ -245,7 +257,8 @@ Its actions run on the component's thread under the interpreter's lock.)")
       .def(
           "describe_resource",
           [](const PluginRegistry& self, const std::string& kind, const std::string& type) {
-            const ResourceParameters needed = parameters_needed(self.resource_kind(kind));
+            const ResourceParameters needed =
+                parameters_needed(self.resource_kind(kind), self.sequences(type));
             return describe_resource(*self.make_resource(kind, type, needed));
           },
           py::arg("kind"), py::arg("type"))
@@ -255,7 +268,8 @@ Its actions run on the component's thread under the interpreter's lock.)")
             const py::object part = instance_part(resource);
             if (!py::isinstance<DataResource>(part)) return describe_resource(*make_resource(resource, self));
             auto data = part.cast<DataResource>();
-            data.parameters = parameters_needed(self.resource_kind(data.kind));  // as large as it must be
+            data.parameters =  // as large as it must be
+                parameters_needed(self.resource_kind(data.kind), self.sequences(data.type));
             return describe_resource(*make_data_resource(data, self));
           },
           py::arg("resource"))

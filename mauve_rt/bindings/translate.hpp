@@ -126,6 +126,8 @@ struct ResourceDescription {
   std::string type;
   std::vector<ServiceDescription> services;
   time_ns_t longest_hold_ns;
+  std::uint64_t refused_values{0};
+  std::string why_refused_value{};
 };
 ResourceDescription describe_resource(const Resource& resource);
 

@@ -61,12 +61,14 @@ def _tell(error: ArchitectureFileError) -> int:
 
 def _check_architecture(path: Path) -> "ArchitectureModel":
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
+    from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
     from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
     from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
-    architecture = build(model, PluginRegistry())
+    registry = PluginRegistry()
+    architecture = build(model, registry)
     configure(model, architecture)
     architecture.cleanup()
     if late := late_writers(model):
@@ -80,6 +82,9 @@ def _check_architecture(path: Path) -> "ArchitectureModel":
     }
     found = ", ".join(counted(count, what) for what, count in counts.items())
     print(f"{path}: {found}: no error found")
+    for name, resource in model.resources.items():
+        if registry.sequences(resource.type):
+            print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, registry):,} bytes")
     return model
 
 

@@ -69,4 +69,5 @@ def bytes_of_resource(resource: ResourceModel, registry: PluginRegistry) -> int:
     told = {each.name: resource.parameters.get(each.name, each.initial) for each in kind.parameters}
     values = kind.values + sum(int(told[each.name]) for each in kind.parameters if each.counts_values)
     depth = (resource.topic.qos.depth or 0) if resource.topic is not None and values else 0
-    return (registry.value_bytes(resource.type) or int(told.get("max_bytes", 0))) * (values + depth)
+    value_bytes = registry.value_bytes(resource.type, resource.parameters)
+    return (value_bytes or int(told.get("max_bytes", 0))) * (values + depth)

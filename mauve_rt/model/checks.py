@@ -192,6 +192,7 @@ class Checks:
             yield self._model.key_problem((*place, "topic"), what, expected=expected, found=found)
         at = (*place, "type" if resource.type else "kind")
         yield from self._structs(self._resources[name].services, at)
+        yield from self._capacities(name)
         yield from self._service(name)
 
     def _parameters(self, resource: ResourceModel, place: Location) -> list[Problem]:
@@ -212,6 +213,16 @@ class Checks:
                 self._unlike.add(found.type)
                 facts = {"expected": found.expected, "found": found.found, "remedy": REMEDY}
                 yield self._model.problem(place, found.what, **facts, code="type_mismatch")
+
+    def _capacities(self, name: str) -> Iterator[Problem]:
+        """Whether each sequence of a resource's type has its capacity."""
+        resource = self._model.resources[name]
+        try:
+            self._loader.registry.value_bytes(resource.type, resource.parameters)
+        except MauveError as error:
+            what = f"resource '{name}': {error.statement}, at {error.element}"
+            facts = {"expected": error.expected, "found": error.found, "remedy": error.remedy}
+            yield self._model.problem(("resources", name), what, **facts, code=error.code)
 
     def _service(self, name: str) -> Iterator[Problem]:
         """The ROS service that a resource calls or offers."""

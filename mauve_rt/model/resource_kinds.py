@@ -10,6 +10,8 @@ from mauve_rt.model.section import Setting
 from mauve_rt.model.yaml_file import Location
 
 _INT64 = 2**63
+_CAPACITY = "capacity"  # with a field behind a point, or as a mapping by fields: of sequences of the type
+_SEQUENCE = Whole(1, 1_000_000_000)
 
 
 @cache
@@ -33,19 +35,25 @@ def read_parameters(
 ) -> dict[str, Any]:
     """The parameters of a resource at `place` of a file; what is wrong is added to `faults`.
 
-    `others`: the keys that a resource of any kind has.
+    `others`: the keys that a resource of any kind has. Capacities of sequences are held against the type when the resource
+    is made.
     """
     known = {each.name: each for each in kind.parameters if each.file_key == each.name}
-    read = {}
+    read: dict[str, Any] = {}
     for key, value in values.items():
-        if key in known:
+        if key.startswith(f"{_CAPACITY}.") and kind.type_kind == "type":
+            read[key] = _SEQUENCE.read(value, (*place, key), faults)
+        elif key == _CAPACITY and isinstance(value, Mapping) and kind.type_kind == "type":
+            for path, count in value.items():
+                read[f"{_CAPACITY}.{path}"] = _SEQUENCE.read(count, (*place, key, path), faults)
+        elif key in known:
             read[key] = _read(known[key], value, (*place, key), faults)
         elif owners := given_kinds_with(key):
             faults.append(Fault((*place, key), "foreign", limit=kind.name, known=owners))
         else:
             faults.append(Fault((*place, key), "unknown", known=(*others, *known)))
     for key, parameter in known.items():
-        if parameter.required and key not in values:
+        if parameter.required and key not in read:
             faults.append(Fault(place, "lacks", limit=f"{key}: {parameter.description}"))
     return read
 

@@ -27,6 +27,23 @@ struct Point {
   double z{};
 };
 
+/// As sensor_msgs has it.
+struct JointState {
+  struct Time {
+    std::int32_t sec{};
+    std::uint32_t nanosec{};
+  };
+  struct Header {
+    Time stamp;
+    mauve::BoundedString<255> frame_id;
+  };
+  Header header;
+  mauve::Sequence<mauve::BoundedString<255>> name;
+  mauve::Sequence<double> position;
+  mauve::Sequence<double> velocity;
+  mauve::Sequence<double> effort;
+};
+
 /// Not a ROS message.
 struct Private {
   double value{};
@@ -114,6 +131,9 @@ struct Trigger {
 
 MAUVE_TYPE(executor_tests::Number, "std_msgs/msg/Float64", data)
 MAUVE_TYPE(executor_tests::Point, "geometry_msgs/msg/Point", x, y, z)
+MAUVE_TYPE(executor_tests::JointState::Time, "builtin_interfaces/msg/Time", sec, nanosec)
+MAUVE_TYPE(executor_tests::JointState::Header, "std_msgs/msg/Header", stamp, frame_id)
+MAUVE_TYPE(executor_tests::JointState, "sensor_msgs/msg/JointState", header, name, position, velocity, effort)
 MAUVE_TYPE(executor_tests::Private, "executor_tests/Private", value)
 MAUVE_TYPE(executor_tests::Attitude, "executor_tests/Attitude", roll, rates, origin, corners, codes, mode,
            level, round)
@@ -370,6 +390,34 @@ struct TwinFsm : mauve::Fsm<TwinShell, Twin> {
   }
 };
 
+/// Turns the joints of each message the other way, every 10 ms.
+struct JointShell : mauve::Shell {
+  mauve::ReadPort<JointState>& input = read_port<JointState>("input");
+  mauve::WritePort<JointState>& output = write_port<JointState>("output");
+};
+
+struct JointTurner : mauve::Core<JointShell> {
+  void act() {
+    shell().input.with([&](const JointState& joints) {
+      if (shell().input.status() != mauve::DataStatus::new_data) return;
+      shell().output.write_with([&](JointState& turned) {
+        turned = joints;
+        for (double& position : turned.position) position = -position;
+      });
+    });
+  }
+};
+
+struct JointFsm : mauve::Fsm<JointShell, JointTurner> {
+  void define() override {
+    mauve::State& run = execution("Turn", "act", &JointTurner::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(10));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
 /// Writes to each kind of resource, every 10 ms.
 struct PilotShell : mauve::Shell {
   mauve::WritePort<Attitude>& attitude = write_port<Attitude>("attitude");
@@ -577,6 +625,11 @@ MAUVE_PLUGINS(registry) {
   registry.type<Private>();
   registry.type<Attitude>();
   registry.type<Owning>();
+  registry.type<JointState>();
+  const std::string joints = "executor_tests/JointShell";
+  registry.shell<JointShell>(joints);
+  registry.core<JointTurner>("executor_tests/JointTurner", joints);
+  registry.fsm<JointFsm>("executor_tests/JointFsm", joints);
   registry.shell<CounterShell>(shell);
   registry.shell<OtherShell>("executor_tests/OtherShell");
   registry.core<Counter>("executor_tests/Counter", shell);

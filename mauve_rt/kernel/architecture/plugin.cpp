@@ -3,6 +3,9 @@
 
 #include <dlfcn.h>
 
+#include <algorithm>
+#include <iterator>
+
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/parts/property.hpp"
 
@@ -354,6 +357,8 @@ std::unique_ptr<FsmBase> PluginRegistry::make_fsm(const std::string& name) const
 std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind, const std::string& type,
                                                         const ResourceParameters& given) const {
   ResourceFactory make;
+  ResourceParameters others = given;
+  ResourceParameters capacities;
   {
     const LockGuard lock(mutex_);
     const ResourceKind known = resource_kind(kind);
@@ -361,8 +366,15 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
     const auto factory = factories.find(type);
     if (factory == factories.end()) throw_not_of_type(known, type);
     make = factory->second;
+    if (known.type == TypeNeed::data) {
+      std::erase_if(others, [](const auto& parameter) { return is_capacity(parameter.first); });
+      std::copy_if(given.begin(), given.end(), std::inserter(capacities, capacities.end()),
+                   [](const auto& parameter) { return is_capacity(parameter.first); });
+      capacities_of(ports_.at(type).shape(), capacities);  // checked for the kinds that take none, too
+    }
   }
-  const ResourceParameters parameters = checked_parameters(kind, given);
+  ResourceParameters parameters = checked_parameters(kind, others);
+  parameters.merge(capacities);
   return made(kind + " " + type, [&] { return make(parameters); });
 }
 
@@ -407,7 +419,7 @@ void PluginRegistry::throw_not_of_type(const ResourceKind& kind, const std::stri
     throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",
                 {.element = "type " + type,
                  .expected = "a trivially copyable type",
-                 .found = "one with a copy constructor of its own",
+                 .found = "one with sequences, or with a copy constructor of its own",
                  .remedy = "use shared_data, or bounded members in the type"});
   }
   if (kind.type == TypeNeed::data) throw_unknown_type(type);
@@ -460,10 +472,18 @@ std::string PluginRegistry::fsm_shell(const std::string& name) const {
   return entry_of(fsms_, name, ErrorCode::unknown_fsm, "fsm").shell;
 }
 
-std::size_t PluginRegistry::value_bytes(const std::string& type) const {
+std::size_t PluginRegistry::value_bytes(const std::string& type, const ResourceParameters& given) const {
   const LockGuard lock(mutex_);
   const auto found = ports_.find(type);
-  return found != ports_.end() ? found->second.value_bytes : 0;
+  if (found == ports_.end()) return 0;
+  const MessageShape shape = found->second.shape();
+  return mauve::value_bytes(shape, capacities_of(shape, given));
+}
+
+std::vector<std::string> PluginRegistry::sequences(const std::string& type) const {
+  const LockGuard lock(mutex_);
+  const auto found = ports_.find(type);
+  return found == ports_.end() ? std::vector<std::string>{} : sequence_paths(found->second.shape());
 }
 
 std::vector<std::string> PluginRegistry::names(const std::string& kind) const {

@@ -7,6 +7,7 @@
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/data/call_type.hpp"
+#include "mauve_rt/data/layout.hpp"
 #include "mauve_rt/data/resource.hpp"
 
 namespace mauve {
@@ -89,6 +90,7 @@ void PortBase::check(const ServiceBase& service) const {
          .remedy = "relay through a shared_data whose type a plug-in library registers; load that library "
                    "before Python makes ports and resources of the type"});
   }
+  check_layout(service);
   if (!fits(service)) {
     throw Error(ErrorCode::type_mismatch, "port and service mean different C++ types by one name",
                 {.element = "port " + name_,
@@ -96,6 +98,27 @@ void PortBase::check(const ServiceBase& service) const {
                  .found = "another C++ type of that name at " + place,
                  .remedy = "let both packages use one declaration of the type, from one header"});
   }
+}
+
+void PortBase::check_layout(const ServiceBase& service) const {
+  if (kind_ != PortKind::read && kind_ != PortKind::write) return;
+  const std::vector<MessageShape> ours = messages();
+  const std::vector<MessageShape> theirs = service.messages();
+  if (ours.empty() || theirs.empty()) return;  // not in C++: as the representation says
+  const auto difference = layout_difference(ours.front(), theirs.front());
+  if (!difference) return;
+  const std::string field = difference->field.empty() ? "" : " in field '" + difference->field + "'";
+  const auto of = [](const void* object) {
+    const std::string library = library_of(object);
+    return library.empty() ? "" : " (" + library + ")";
+  };
+  const Resource* resource = service.resource();
+  throw Error(ErrorCode::type_mismatch, "port and service hold the type in different structs" + field,
+              {.element = "port " + name_,
+               .expected = difference->expected + of(this),
+               .found = difference->found + " at " + (resource == nullptr ? "" : resource->name() + ".") +
+                        service.name() + of(&service),
+               .remedy = "build both packages against the same version of " + type_});
 }
 
 PortConnection PortBase::prepare(ServiceBase& service, const std::string& resource_name) const {

@@ -36,6 +36,7 @@ std::string type_text(const FieldShape& shape, std::size_t bytes) {
     if (bytes != 0) text += " of " + std::to_string(bytes) + " bytes";
   }
   if (shape.arity == FieldArity::fixed) text += "[" + std::to_string(shape.size) + "]";
+  if (shape.arity == FieldArity::sequence) text += "[]";
   if (shape.arity == FieldArity::bounded) text += "[<=" + std::to_string(shape.size) + "]";
   return text;
 }

@@ -13,6 +13,7 @@ from mauve_rt._kernel import (
     HELD_STOPPED,
     ComponentDescription,
     RecentMaxima,
+    ResourceDescription,
     RuleFacts,
     ShadowRecord,
     allocation_counting,
@@ -67,6 +68,7 @@ class Diagnostics:
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
+        array.status += [self._refusals(one) for one in self._runtime.described_resources() if one.refused_values]
         array.status += [self._shadow(record) for record in self._runtime.shadows()]
         held = held_elements(self._runtime)
         array.status += [self._rule(facts, held) for facts in self._rules.facts()]
@@ -114,6 +116,13 @@ class Diagnostics:
             values[f"execution_max_ns[{time.state}]"] = time.max_ns
             values[f"execution_recent_max_ns[{time.state}]"] = recent.execution_ns.get(time.state, 0)
         return self._status(part.name, level, message, values)
+
+    def _refusals(self, resource: ResourceDescription) -> Any:
+        """Of a resource that refused values."""
+        new = self._more(resource.name, "refused_values", resource.refused_values)
+        level = DiagnosticStatus.WARN if new else DiagnosticStatus.OK
+        message = f"{resource.refused_values} values refused; the last one: {resource.why_refused_value}"
+        return self._status(resource.name, level, message, {"refused_values": resource.refused_values})
 
     def _remarks(self, part: ComponentDescription, recent: RecentMaxima) -> Iterator[tuple[bytes, str]]:
         """What reached a threshold since the last status: level; measured beside allowed figure."""

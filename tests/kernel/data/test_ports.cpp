@@ -4,14 +4,19 @@
 
 namespace mauve::testing::test_ports {
 
-/// Another package's idea of the same message.
+/// As another package has the same message.
 struct OtherNumber {
-  double value{};
+  double value_m{};
+};
+/// As it had it in another version.
+struct OldNumber {
+  float value{};
 };
 
 }  // namespace mauve::testing::test_ports
 
-MAUVE_TYPE(mauve::testing::test_ports::OtherNumber, "std_msgs/msg/Float64", value)
+MAUVE_TYPE(mauve::testing::test_ports::OtherNumber, "std_msgs/msg/Float64", value_m)
+MAUVE_TYPE(mauve::testing::test_ports::OldNumber, "std_msgs/msg/Float64", value)
 
 namespace mauve::testing::test_ports {
 
@@ -227,8 +232,15 @@ TEST_F(PortsFixture, UnequalKindsAndTypesAreRefused) {
   EXPECT_EQ(0U, shared.read.ports());
 }
 
-TEST_F(PortsFixture, AnEqualNameIsNotAnEqualType) {
-  SharedData<OtherNumber> other;
+TEST_F(PortsFixture, ATypeIsItsNameAndItsLayout) {
+  SharedData<OtherNumber> equal;
+  shell.input.connect(equal.read, "r");
+  shell.output.connect(equal.write, "r");
+  ASSERT_TRUE(shell.output.write({3.5}));
+  EXPECT_EQ(3.5, shell.input.read().value.value);
+  shell.output.disconnect();
+
+  SharedData<OldNumber> other;
   ASSERT_EQ(shell.input.type(), other.read.type());
   EXPECT_EQ(ErrorCode::type_mismatch, code_of([&] { shell.input.connect(other.read, "r"); }));
   EXPECT_EQ(ErrorCode::type_mismatch, code_of([&] { shell.output.connect(other.write, "r"); }));

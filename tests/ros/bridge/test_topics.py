@@ -23,7 +23,7 @@ from rclpy.qos import (
     ReliabilityPolicy,
 )
 from rclpy.serialization import deserialize_message, serialize_message
-from sensor_msgs.msg import LaserScan
+from sensor_msgs.msg import JointState, LaserScan
 from std_msgs.msg import Bool, Empty, Float64, String
 
 from mauve_rt._bridge import TopicReport
@@ -307,3 +307,40 @@ def test_the_silence_of_a_link_is_listened_for_by_best_effort_too(bind: Bind, gr
     bound.topics.listen_for_silence({"sure"}, ())
     graph.spin_until(lambda: sure.get_subscription_count() == 1, "the second subscription to be gone")
     assert bound.report("/robot/sure").passed == 5
+
+
+def test_sequences_go_from_topic_to_topic_and_what_is_too_long_is_explained(bind: Bind, graph: Any) -> None:
+    capacity = "capacity: {name: 3, position: 3, velocity: 3, effort: 3}"
+    bound = bind(f"""\
+  joints: {{kind: shared_data, type: sensor_msgs/msg/JointState, {capacity},
+           topic: {{name: joints, direction: subscribe}}}}
+  turned: {{kind: shared_data, type: sensor_msgs/msg/JointState, {capacity},
+           topic: {{name: turned, direction: publish}}}}
+""")
+    voice = graph.voice(JointState, "/robot/joints", QoSProfile(depth=5))
+    heard = graph.hear(JointState, "/robot/turned", QoSProfile(depth=5))
+    said = JointState(name=["elbow", "wrist"], position=[1.0, 2.5])
+
+    def passed() -> bool:
+        voice.publish(said)
+        return bound.report("/robot/joints").passed > 0
+
+    graph.spin_until(passed, "the joints")
+    assert bound.received("joints", JointState) == said
+    message = bound.runtime.host.read_resource("joints")[0]
+
+    def came() -> bool:
+        bound.runtime.host.write_resource("turned", message)
+        return bool(heard)
+
+    graph.spin_until(came, "what was written")
+    assert heard[-1] == said
+
+    said.position = [0.0] * 4
+
+    def refused() -> bool:
+        voice.publish(said)
+        return bool(bound.report("/robot/joints").refusal)
+
+    graph.spin_until(refused, "the refusal")
+    assert bound.report("/robot/joints").refusal.startswith("position has 4 elements, the resource's capacity is 3")

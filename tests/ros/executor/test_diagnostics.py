@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from sensor_msgs.msg import JointState
 
 from mauve_msgs.srv import ReplaceCore
 from mauve_rt._kernel import allocation_counting
@@ -126,3 +127,39 @@ def test_every_status_has_a_name_of_its_own(
     assert len(names) == len(set(names)), names
     topics = {name.partition(": ")[2] for name in names if ": topic /robot_1/set " in name}
     assert topics == {"topic /robot_1/set (set)", "topic /robot_1/set (again)"}
+
+
+def test_diagnostics_counts_values_that_were_refused(
+    tmp_path: Path, plugin_prefix: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    capacity = "capacity: {name: 4, position: 4, velocity: 4, effort: 4}"
+    path = tmp_path / "joints.yaml"
+    path.write_text(
+        f"""\
+mauve: 1
+executor: {{namespace: /robot_1}}
+components:
+  turner: {{shell: executor_tests/JointShell, core: executor_tests/JointTurner, fsm: executor_tests/JointFsm}}
+resources:
+  joints: {{kind: shared_data, type: sensor_msgs/msg/JointState, {capacity},
+           topic: {{name: joints, direction: subscribe}}}}
+  turned: {{kind: shared_data, type: sensor_msgs/msg/JointState, {capacity.replace("position: 4", "position: 2")}}}
+connections:
+  - [turner.input, joints.read]
+  - [turner.output, turned.write]
+""",
+        encoding="utf-8",
+    )
+    start_executor("-p", f"architecture:={path}")
+    health = Health(graph)
+    voice = graph.voice(JointState, "/robot_1/joints", 5)
+
+    def counted() -> bool:
+        voice.publish(JointState(position=[1.0, 2.0, 3.0]))
+        return "turned" in {status.name.rpartition(": ")[2] for status in health.of("turned")}
+
+    graph.spin_until(counted, "a refused value")
+    status = health.of("turned")[0]
+    assert status.level == DiagnosticStatus.WARN
+    assert "position has more elements than its memory holds, the resource's capacity is 2" in status.message
+    assert int(health.values("turned")["refused_values"]) > 0

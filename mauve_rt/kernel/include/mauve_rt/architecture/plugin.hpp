@@ -173,8 +173,11 @@ class PluginRegistry {
 
   std::string core_shell(const std::string& name) const;
   std::string fsm_shell(const std::string& name) const;
-  /// What a value of a registered data type takes, in bytes; 0 when it is none.
-  std::size_t value_bytes(const std::string& type) const;
+  /// What a value of a registered data type takes, in bytes, with its sequences of these capacities; 0 when it is none.
+  /// Throws Error as capacities_of().
+  std::size_t value_bytes(const std::string& type, const ResourceParameters& given) const;
+  /// The sequences of a registered data type, whose capacities its resources need: sequence_paths(). Empty when it is none.
+  std::vector<std::string> sequences(const std::string& type) const;
   /// Registered names of "shell", "core", "fsm", "resource", "type" or "call_type", sorted. Throws Error
   /// (invalid_argument).
   std::vector<std::string> names(const std::string& kind) const;
@@ -196,7 +199,6 @@ class PluginRegistry {
   struct PortFactories {
     std::unique_ptr<PortBase> (*read)(const std::string& name);
     std::unique_ptr<PortBase> (*write)(const std::string& name, const OutputOptions& output);
-    std::size_t value_bytes;
     MessageShape (*shape)();
   };
   template <Described T>
@@ -207,7 +209,7 @@ class PluginRegistry {
             [](const std::string& name, const OutputOptions& output) -> std::unique_ptr<PortBase> {
               return std::make_unique<WritePort<T>>(name, output);
             },
-            sizeof(T), message_shape<T>};
+            message_shape<T>};
   }
 
   struct KindEntry {

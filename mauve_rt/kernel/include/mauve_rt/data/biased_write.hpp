@@ -2,6 +2,7 @@
 // BiasedWrite: the service `write` of a resource, for its only port without a lock.
 #pragma once
 
+#include <memory>
 #include <string>
 
 #include "mauve_rt/base/biased_mutex.hpp"
@@ -11,7 +12,8 @@
 
 namespace mauve {
 
-/// Keeps writers apart. The resource has `bool take(value, time_ns)`, which it calls under mutex(), and written().
+/// Keeps writers apart. The resource has `bool take(value, time_ns)`, which it calls under mutex(), and written(); for large
+/// values also borrow(), publish() and give_back() of a place, each called under mutex(), and make_room_to_write().
 ///
 /// | member | written by             | under   |
 /// | ------ | ---------------------- | ------- |
@@ -37,6 +39,38 @@ class BiasedWrite final : public WriteService<T> {
     owner_.written(time_ns);
     return TryWrite::done;
   }
+  T* borrow(BiasedMutex::Seat* seat) noexcept override {
+    if constexpr (kIsLarge<T>) {
+      const BiasedMutex::Hold hold(mutex_, seat);
+      return owner_.borrow();
+    }
+    return nullptr;
+  }
+  bool publish(T& place, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept override {
+    if constexpr (kIsLarge<T>) {
+      const bool is_admitted = owner_.limits().admits(place);
+      {
+        const BiasedMutex::Hold hold(mutex_, seat);
+        if (!is_admitted || !floor_.admits(time_ns)) {
+          owner_.give_back(place);
+          return is_admitted;
+        }
+        if (!owner_.publish(place, time_ns)) return false;
+      }
+      owner_.written(time_ns);
+    }
+    return true;
+  }
+  void give_back(T& place, BiasedMutex::Seat* seat) noexcept override {
+    if constexpr (kIsLarge<T>) {
+      const BiasedMutex::Hold hold(mutex_, seat);
+      owner_.give_back(place);
+    }
+  }
+  std::unique_ptr<T> make() const override { return owner_.limits().make(); }
+  void make_room(std::uint32_t ports) override {
+    if constexpr (kIsLarge<T>) owner_.make_room_to_write(ports);
+  }
   void raise_floor(time_ns_t instant_ns) noexcept override { floor_.raise(instant_ns); }
   void forget_floor() noexcept override { floor_.forget(); }
   bool seat(BiasedMutex::Seat& seat) noexcept override {
@@ -52,6 +86,12 @@ class BiasedWrite final : public WriteService<T> {
 
  private:
   bool put(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
+    if constexpr (kIsLarge<T>) {
+      T* const place = owner_.limits().admits(value) ? borrow(seat) : nullptr;
+      if (place == nullptr) return false;
+      *place = value;  // not under the lock
+      return publish(*place, time_ns, seat);
+    }
     {
       const BiasedMutex::Hold hold(mutex_, seat);
       if (!floor_.admits(time_ns)) return true;

@@ -17,6 +17,7 @@
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/bounded.hpp"
+#include "mauve_rt/data/sequence.hpp"
 
 static_assert(std::endian::native == std::endian::little,
               "CDR is written little-endian as the machine holds it");
@@ -70,6 +71,11 @@ class CdrWriter {
     put(static_cast<std::uint32_t>(value.size()));
     put_items(std::span<const T>(value.data(), value.size()));
   }
+  template <typename T>
+  void put(const Sequence<T>& value) {
+    put(static_cast<std::uint32_t>(value.size()));
+    put_items(value.view());
+  }
   template <Described T>
   void put(const T& value) {
     if constexpr (kIsEmpty<T>) put(std::uint8_t{0});
@@ -103,6 +109,20 @@ class CdrWriter {
   std::vector<std::byte>& buffer_;
 };
 
+/// A sequence of a message that has more elements than its place.
+struct TooLong {
+  std::string path;  // of the field, dotted within messages
+  std::uint32_t size{0};
+
+  /// The field is within this one of a struct. [non-rt]
+  void add(std::string_view field_names, std::size_t field) {
+    while (field-- > 0) field_names.remove_prefix(field_names.find(',') + 1);
+    field_names = field_names.substr(0, field_names.find(','));
+    field_names.remove_prefix(field_names.find_first_not_of(' '));
+    path = std::string(field_names) + (path.empty() ? "" : "." + path);
+  }
+};
+
 /// Deserializes in place, without allocation; every getter returns false on a short or excessive message.
 /// All functions [rt].
 class CdrReader {
@@ -133,16 +153,28 @@ class CdrReader {
   }
   template <typename T, std::size_t N>
   bool get(BoundedVector<T, N>& value) MAUVE_RT {
-    std::uint32_t size = 0;
-    if (!get(size) || !value.resize(size)) return ok_ = false;
-    return get_items(std::span<T>(value.data(), size));
+    return get_sized(value);
+  }
+  template <typename T>
+  bool get(Sequence<T>& value) MAUVE_RT {
+    value.clear();
+    return get_sized(value);
   }
   template <Described T>
   bool get(T& value) MAUVE_RT {
     if constexpr (kIsEmpty<T>) (void)take(1, 1);
-    std::apply([&](auto... member) { (void)(get(value.*member) && ...); }, TypeTraits<T>::fields());
+    [[maybe_unused]] std::size_t field = 0;
+    [[maybe_unused]] const auto got = [&](auto member) {
+      if (get(value.*member)) return ++field != 0;
+      if (too_long_ != nullptr && too_long_->size != 0)
+        MAUVE_RT_TRUSTED(too_long_->add(TypeTraits<T>::field_names, field));  // only where an ordinary thread asks
+      return false;
+    };
+    std::apply([&](auto... member) { (void)(got(member) && ...); }, TypeTraits<T>::fields());
     return ok_;
   }
+  /// From now on keeps which sequence has more elements than its place. [non-rt]
+  void explain(TooLong& too_long) { too_long_ = &too_long; }
 
  private:
   template <typename T>
@@ -158,6 +190,16 @@ class CdrReader {
     }
     return ok_;
   }
+  template <typename Items>
+  bool get_sized(Items& value) {
+    std::uint32_t size = 0;
+    if (!get(size)) return false;
+    if (!value.resize(size)) {
+      if (too_long_ != nullptr) too_long_->size = size;
+      return ok_ = false;
+    }
+    return get_items(std::span(value.data(), size));
+  }
   const std::byte* take(std::size_t size, std::size_t alignment) {
     const std::size_t offset = position_ - kCdrHeader.size();
     const std::size_t start = kCdrHeader.size() + (offset + alignment - 1) / alignment * alignment;
@@ -172,6 +214,7 @@ class CdrReader {
   std::span<const std::byte> data_;
   std::size_t position_{0};
   bool ok_{false};
+  TooLong* too_long_{nullptr};
 };
 
 }  // namespace mauve

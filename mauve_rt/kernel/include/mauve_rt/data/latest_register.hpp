@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <type_traits>
 #include <vector>
@@ -45,6 +46,7 @@ namespace mauve {
 /// | Slot::entry    | writer, nobody else in | who took it     | by word_ and released                           |
 /// | Slot::taken    | writer                 | writer          | -                                               |
 /// | Slot::released | readers; writer resets | writer          | readers release after the copy, writer acquires |
+/// | Slot::is_borrowed | writers             | writers         | the lock that writers hold                      |
 template <typename T>
 class LatestRegister {
  public:
@@ -54,52 +56,77 @@ class LatestRegister {
     T value{};
   };
 
-  /// [setup]
-  explicit LatestRegister(std::size_t readers) { reserve(readers); }
+  /// `prepare`: gives a slot's value what memory it needs. [setup]
+  explicit LatestRegister(std::size_t readers, std::function<void(T&)> prepare = {})
+      : prepare_(std::move(prepare)) {
+    reserve(readers);
+  }
 
   /// Trivially copyable types up to this many bytes are copied from front_ first.
   static constexpr std::size_t kSmall = 112;  // with version and time two cache lines
   static constexpr bool kHasFront = std::is_trivially_copyable_v<T> && sizeof(T) <= kSmall;
 
-  /// Makes room for so many readers, also while the others read and write. [non-rt] One thread at a time.
-  void reserve(std::size_t readers) {
-    if (readers + 2 <= slots_.size()) return;
-    while (slots_.size() < readers + 2) slots_.push_back(std::make_unique<Slot>());
+  /// Makes room for so many readers, also while the others read and write; and for writers that borrow. [non-rt]
+  /// One thread at a time.
+  void reserve(std::size_t readers, std::size_t borrowers = 0) {
+    borrowers_ = std::max(borrowers_, borrowers);
+    if (readers + borrowers_ + 2 <= slots_.size()) return;
+    while (slots_.size() < readers + borrowers_ + 2) {
+      slots_.push_back(std::make_unique<Slot>());
+      if (prepare_) prepare_(slots_.back()->entry.value);
+    }
     auto table = std::make_unique<Table>();
     for (const auto& slot : slots_) table->push_back(slot.get());
     tables_.push_back(std::move(table));
     table_.store(tables_.back().get(), std::memory_order_release);
   }
   /// How many readers may keep a slot. [rt] As reserve().
-  std::size_t room() const MAUVE_RT { return slots_.size() - 2; }
+  std::size_t room() const MAUVE_RT { return slots_.size() - borrowers_ - 2; }
 
-  /// Publishes a value, in at most `readers` + 2 looks for a free slot. [rt] One thread at a time.
+  /// Publishes a value, in at most as many looks for a free slot as there are. [rt] One thread at a time.
   /// False, and nothing written, only when more readers than declared keep slots.
   bool write(const T& value, time_ns_t time_ns) MAUVE_RT {
     const Table& slots = *table_.load(std::memory_order_acquire);
-    const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written here only
-    MAUVE_AUDIT(newest < slots.size());
-    for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
-      Slot& slot = *slots[i];
-      // acquire: what its readers copied, they have copied
-      if (slot.released.load(std::memory_order_acquire) != slot.taken) continue;
-      slot.released.store(0, std::memory_order_relaxed);  // relaxed: published with the word
-      slot.entry.value = value;
-      slot.entry.time_ns = time_ns;
-      slot.entry.sequence = ++sequence_;
-      if constexpr (kHasFront) front_.store(value, time_ns, sequence_);
-      // release: publishes the slot. acquire: who has taken one gave another one back before; else none might look free
-      const std::uint64_t before = word_.exchange(i << kCountBits, std::memory_order_acq_rel);
-      MAUVE_AUDIT(index_of(before) == newest);  // else another thread writes, too
-      slots[newest]->taken = before & kCountMask;
-      return true;
-    }
-    return false;
+    const std::size_t i = free_slot(slots);
+    if (i == kNone) return false;
+    slots[i]->entry.value = value;
+    if constexpr (kHasFront) front_.store(value, time_ns, sequence_ + 1);
+    publish(i, time_ns, slots);
+    return true;
+  }
+
+  // Who writes in place holds a slot meanwhile; these two run one at a time with write(), what is between them need not.
+
+  /// A free slot's value, which no reader and no other writer uses; nullptr: there is none. [rt]
+  T* borrow() MAUVE_RT {
+    const Table& slots = *table_.load(std::memory_order_acquire);
+    const std::size_t i = free_slot(slots);
+    if (i == kNone) return nullptr;
+    slots[i]->is_borrowed = true;
+    return &slots[i]->entry.value;
+  }
+  /// Ends the loan; `time_ns`: and publishes the value, written then. [rt]
+  void give_back(const T& borrowed, const time_ns_t* time_ns) MAUVE_RT {
+    const Table& slots = *table_.load(std::memory_order_acquire);
+    std::size_t i = 0;
+    while (&slots[i]->entry.value != &borrowed) ++i;
+    slots[i]->is_borrowed = false;
+    if (time_ns == nullptr) return;
+    if constexpr (kHasFront) front_.store(borrowed, *time_ns, sequence_ + 1);
+    publish(i, *time_ns, slots);
+  }
+  /// How many slots are borrowed. [rt] As borrow().
+  std::size_t borrowed() const MAUVE_RT {
+    const Table& slots = *table_.load(std::memory_order_acquire);
+    return static_cast<std::size_t>(
+        std::count_if(slots.begin(), slots.end(), [](const Slot* slot) { return slot->is_borrowed; }));
   }
 
   /// The newest entry as a port sees it; `fallback` when there is none. [rt] wait-free.
   Sample<T> sample(const T& fallback, ReaderState& reader) MAUVE_RT {
-    if constexpr (kHasFront) {
+    if constexpr (kHasSequences<T>) {
+      return {};  // no port asks: a copy would allocate
+    } else if constexpr (kHasFront) {
       Sample<T> sample{.value = fallback};
       sample.status = read(sample.value, sample.time_ns, reader);
       return sample;
@@ -125,6 +152,12 @@ class LatestRegister {
     const Entry& entry = newest(held);
     return entry.sequence == 0 ? nullptr : &entry.value;
   }
+  /// The same with all that a port wants to know; until the reader's next call. [rt] wait-free.
+  Loan<T> lend(ReaderState& reader) MAUVE_RT {
+    const Entry& entry = newest(reader.held);
+    if (entry.sequence == 0) return {};
+    return {&entry.value, reader.look(entry.sequence), entry.time_ns};
+  }
   /// Gives back what the reader keeps. [rt] wait-free.
   void let_go(std::uint32_t& held) MAUVE_RT {
     if (held == 0) return;
@@ -136,12 +169,14 @@ class LatestRegister {
   static constexpr unsigned kCountBits = 48;
   static constexpr std::uint64_t kCountMask = (std::uint64_t{1} << kCountBits) - 1;
   static constexpr std::size_t kCacheLine = 64;
+  static constexpr std::size_t kNone = SIZE_MAX;
   static constexpr int kCopies = 8;  // tries: together about as long as one take of a contended slot
   struct Nothing {};
 
   struct alignas(kCacheLine) Slot {
     Atomic<std::uint64_t> released{0};
     std::uint64_t taken{0};
+    bool is_borrowed{false};
     Entry entry;
   };
 
@@ -150,6 +185,31 @@ class LatestRegister {
   static std::size_t index_of(std::uint64_t word) noexcept { return word >> kCountBits; }
   static std::size_t next(std::size_t i, const Table& slots) noexcept {
     return i + 1 == slots.size() ? 0 : i + 1;
+  }
+  /// One that neither readers nor a borrower use, and that is not the newest; kNone: there is none.
+  std::size_t free_slot(const Table& slots) noexcept {
+    const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
+    MAUVE_AUDIT(newest < slots.size());
+    for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
+      Slot& slot = *slots[i];
+      // acquire: what its readers copied, they have copied
+      if (slot.released.load(std::memory_order_acquire) != slot.taken) continue;
+      if (kIsLarge<T> && slot.is_borrowed) continue;
+      return i;
+    }
+    return kNone;
+  }
+  /// A free or borrowed slot that was filled becomes the newest.
+  void publish(std::size_t i, time_ns_t time_ns, const Table& slots) noexcept {
+    const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
+    Slot& slot = *slots[i];
+    slot.released.store(0, std::memory_order_relaxed);  // relaxed: published with the word
+    slot.entry.time_ns = time_ns;
+    slot.entry.sequence = ++sequence_;
+    // release: publishes the slot. acquire: who has taken one gave another one back before; else none might look free
+    const std::uint64_t before = word_.exchange(i << kCountBits, std::memory_order_acq_rel);
+    MAUVE_AUDIT(index_of(before) == newest);  // else another thread writes, too
+    slots[newest]->taken = before & kCountMask;
   }
   Slot& slot(std::uint32_t held) noexcept {
     const Table& slots = *table_.load(std::memory_order_acquire);
@@ -192,6 +252,8 @@ class LatestRegister {
   alignas(kCacheLine) Atomic<std::uint64_t> word_{0};
   alignas(kCacheLine) std::uint64_t sequence_{0};  // of the writer
   alignas(kCacheLine) Atomic<const Table*> table_{nullptr};
+  const std::function<void(T&)> prepare_;
+  std::size_t borrowers_{0};
   std::vector<std::unique_ptr<Slot>> slots_;
   std::vector<std::unique_ptr<Table>> tables_;
 };

@@ -55,7 +55,7 @@ struct LatestValueKind {
             .has_one_writer = true};
   }
   template <Described T>
-    requires std::is_trivially_copyable_v<T>
+    requires std::is_trivially_copyable_v<T>  // which one with sequences is not
   static std::unique_ptr<Resource> make(const ResourceParameters& given) {
     return std::make_unique<LatestValue<T>>(
         static_cast<std::uint32_t>(get<std::int64_t>(given, "max_readers")));

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mauve_rt/base/biased_mutex.hpp"
+#include "mauve_rt/data/capacities.hpp"
 #include "mauve_rt/data/cdr.hpp"
 #include "mauve_rt/data/resource.hpp"
 #include "mauve_rt/data/write_log.hpp"
@@ -13,8 +14,17 @@ namespace mauve {
 template <Described T, typename Base, typename Lock = BiasedMutex>
 class LoggedResource : public Base {
  public:
-  using Base::Base;
-  void begin_log(std::size_t bytes) override { log_.open(bytes, writers()); }
+  /// [setup]
+  LoggedResource(std::string kind, std::string type, Capacities capacities = {})
+      : Base(std::move(kind), std::move(type)), limits_(std::move(capacities)) {}
+
+  void begin_log(std::size_t bytes) override {
+    std::size_t place_bytes = sizeof(WrittenValue<T>);
+    if constexpr (kHasSequences<T>)
+      place_bytes = sizeof(time_ns_t) + value_bytes(message_shape<T>(), limits_.capacities());
+    log_.open(bytes, writers(), place_bytes,
+              [this](WrittenValue<T>& place) { limits_.allocate(place.value); });
+  }
   void end_log() override { log_.close(writers()); }
   bool next_write(std::vector<std::byte>& message, time_ns_t& time_ns) override {
     return log_.next([&](const WrittenValue<T>& written) {
@@ -23,8 +33,24 @@ class LoggedResource : public Base {
     });
   }
   std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
+  std::uint64_t refused_values() const noexcept override { return limits_.refused(); }
+  std::string why_refused_value() const override { return limits_.refusal(); }
+  std::string why_refused(std::span<const std::byte> message) const override {
+    const auto value = limits_.make();
+    TooLong found;
+    CdrReader reader(message);
+    reader.explain(found);
+    if (reader.get(*value) || found.size == 0) return Base::why_refused(message);
+    const auto capacity = limits_.capacities().find(found.path);
+    if (capacity == limits_.capacities().end())
+      return found.path + " has " + std::to_string(found.size) + " elements, more than the struct holds";
+    return overflow_text(found.path, capacity->second, found.size);
+  }
 
  protected:
+  /// Of the sequences of its values. [rt]
+  SequenceLimits<T>& limits() MAUVE_RT { return limits_; }
+  const SequenceLimits<T>& limits() const MAUVE_RT { return limits_; }
   /// After a write that succeeded. [rt] Under the lock of the writers.
   void log(const T& value, time_ns_t time_ns) MAUVE_RT { log_.put(value, time_ns); }
 
@@ -32,6 +58,7 @@ class LoggedResource : public Base {
   /// The lock that every writer holds. [rt]
   virtual Lock& writers() MAUVE_RT = 0;
 
+  SequenceLimits<T> limits_;
   WriteLog<WrittenValue<T>> log_;  // under writers()
 };
 

@@ -15,8 +15,8 @@
 
 namespace mauve {
 
-/// How many elements a field has: one; always `size`; at most `size`.
-enum class FieldArity : std::uint8_t { one, fixed, bounded };
+/// How many elements a field has: one; always `size`; at most `size`; as many as its memory holds.
+enum class FieldArity : std::uint8_t { one, fixed, bounded, sequence };
 
 /// One field of a struct, in the words of .msg files.
 struct FieldShape {
@@ -26,6 +26,7 @@ struct FieldShape {
   FieldArity arity{FieldArity::one};
   std::size_t size{};                // of an array
   std::size_t offset{};              // of the member within its struct
+  std::size_t item_bytes{};          // of an element of a sequence
   std::vector<FieldShape> fields{};  // of a message within the message
 };
 
@@ -84,6 +85,16 @@ struct ShapeOf<BoundedVector<T, N>> {
     FieldShape shape = ShapeOf<T>::get();
     shape.arity = FieldArity::bounded;
     shape.size = N;
+    return shape;
+  }
+};
+
+template <typename T>
+struct ShapeOf<Sequence<T>> {
+  static FieldShape get() {
+    FieldShape shape = ShapeOf<T>::get();
+    shape.arity = FieldArity::sequence;
+    shape.item_bytes = sizeof(T);
     return shape;
   }
 };

@@ -34,14 +34,16 @@ struct PortLimits {
 /// | register_ | who writes                                             | write.mutex(), biased to the only port       |
 /// | seats_    | ports that come and go                                 | relaxed: a count, nothing depends on its order |
 /// | register_.reserve() | who prepares a connection                    | room_mutex_                                  |
+/// | limits_   | any                                                    | its own                                      |
 template <Described T>
 class NewestValue : public LoggedResource<T, NewestResource> {
  public:
   /// `readers`: places for ports that are there from the start. [setup]
-  NewestValue(std::string kind, PortLimits limits, std::uint32_t readers)
-      : LoggedResource<T, NewestResource>(std::move(kind), type_name<T>()),
+  NewestValue(std::string kind, PortLimits limits, std::uint32_t readers, Capacities capacities = {})
+      : LoggedResource<T, NewestResource>(std::move(kind), type_name<T>(), std::move(capacities)),
         limits_(limits),
-        register_(readers + kOthers) {
+        register_(readers + kOthers, [this](T& value) { this->limits().allocate(value); }) {
+    if constexpr (kIsLarge<T>) register_.reserve(register_.room(), kOtherWriters);
     this->offer(read);
     this->offer(write);
   }
@@ -52,7 +54,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     others_mutex_.set_trace_id(TraceNames::intern(name));
   }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
-    auto value = std::make_unique<T>();
+    const auto value = write.make();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
   std::optional<NumberPlace> find_number(std::string_view path) const override {
@@ -68,7 +70,8 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   }
 
  private:
-  static constexpr std::size_t kOthers = 1;  // one at a time, under others_mutex_
+  static constexpr std::size_t kOthers = 1;        // one at a time, under others_mutex_
+  static constexpr std::size_t kOtherWriters = 2;  // without a port: a topic, and who writes a message by hand
 
   class Read final : public ReadService<T> {
    public:
@@ -82,6 +85,10 @@ class NewestValue : public LoggedResource<T, NewestResource> {
       return status;
     }
     LatestRegister<T>* latest() noexcept override { return &owner_.register_; }
+    bool lends(const ReaderState& reader) const noexcept override { return reader.seat != nullptr; }
+    Loan<T> lend(ReaderState& reader) noexcept override { return owner_.register_.lend(reader); }
+    std::unique_ptr<T> make() const override { return owner_.limits().make(); }
+    bool is_whole(const T& value) noexcept override { return owner_.limits().admits(value); }
     void let_go(ReaderState& reader) noexcept override {
       owner_.register_.let_go(reader.held);
       reader = {.seat = reader.seat};
@@ -105,8 +112,15 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     this->log(value, time_ns);
     return true;
   }
+  T* borrow() noexcept { return register_.borrow(); }
+  bool publish(T& place, time_ns_t time_ns) noexcept {
+    this->log(place, time_ns);  // first: then it is the readers'
+    register_.give_back(place, &time_ns);
+    return true;
+  }
+  void give_back(T& place) noexcept { register_.give_back(place, nullptr); }
   DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
-    auto value = std::make_unique<T>();
+    const auto value = read.make();
     ReaderState reader{.seen = seen};
     const DataStatus status = read.read(*value, time_ns, reader);
     seen = reader.seen;
@@ -114,6 +128,18 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     return status;
   }
 
+  /// Called for a port that comes to write; `ports`: how many there will be.
+  void make_room_to_write(std::uint32_t ports) {
+    if constexpr (kIsLarge<T>) {
+      const LockGuard lock(room_mutex_);
+      std::size_t left_behind = 0;
+      {
+        const LockGuard no_writer(write.mutex());
+        left_behind = register_.borrowed();
+      }
+      register_.reserve(register_.room(), ports + left_behind + kOtherWriters);
+    }
+  }
   /// A reader whose component was removed while a state of it hung keeps its place until that ends: it is none of the ports.
   void make_room(std::uint32_t ports) {
     const LockGuard lock(room_mutex_);

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <type_traits>
+#include <utility>
 
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/latest_register.hpp"
@@ -19,6 +20,7 @@ class ReadPort final : public PortBase {
  public:
   explicit ReadPort(std::string name) : PortBase(std::move(name), PortKind::read, type_name<T>()) {}
   ReadPort(std::string name, const T& initial)
+    requires(!kHasSequences<T>)
       : PortBase(std::move(name), PortKind::read, type_name<T>()), default_(initial) {}
 
   /// Lets it go unconnected. [setup]
@@ -29,13 +31,49 @@ class ReadPort final : public PortBase {
 
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
-  Sample<T> read() MAUVE_RT { return is_special() ? read_specially() : read_now(); }
-  /// The same into a place of the caller's, for large types; untouched when nothing is there. [rt]
+  Sample<T> read() MAUVE_RT
+    requires(!kHasSequences<T>)  // a copy would allocate: use with(), or read() into a place from prototype()
+  {
+    return is_special() ? read_specially() : read_now();
+  }
+  /// The same into a place of the caller's, for large types; untouched when nothing is there. Status none as well when the place
+  /// has no memory for the value's sequences. [rt]
   DataStatus read(T& value, time_ns_t* time_ns = nullptr) MAUVE_RT {
     if (is_special()) [[unlikely]]
       return read_specially(value, time_ns);
     return find(value, time_ns);
   }
+  /// Calls `use` with the value where it lies, unless there is none to be had; large values are not copied. References to it end
+  /// with the call. [rt] as far as `use` is; large values of a resource of your own that lends none are copied to the heap.
+  template <typename Use>
+  DataStatus with(Use&& use, time_ns_t* time_ns = nullptr) {
+    if (is_previewed()) [[unlikely]]
+      return stand_in<ReadPort>().with(std::forward<Use>(use), time_ns);
+    if constexpr (!kIsLarge<T>) {
+      T value = default_;
+      const DataStatus status = read(value, time_ns);
+      if (status != DataStatus::none) std::forward<Use>(use)(std::as_const(value));
+      return status;
+    } else {
+      if (service_ != nullptr && !is_closed() && !service_->lends(reader_)) {
+        const std::unique_ptr<T> value = make();
+        const DataStatus status = read(*value, time_ns);
+        if (status != DataStatus::none) std::forward<Use>(use)(std::as_const(*value));
+        return status;
+      }
+      const Loaned loaned(is_closed() ? nullptr : service_, reader_);
+      const Loan<T>& loan = loaned.loan;
+      status_ = loan.status;
+      if (loan.status != DataStatus::none) reader_.time_ns = loan.time_ns;
+      if (time_ns != nullptr) *time_ns = reader_.time_ns;
+      if (is_special() && is_tapped()) [[unlikely]]
+        tell_read(loan.value != nullptr ? loan.value : &default_, status_, reader_.time_ns);
+      if (loan.value != nullptr) std::forward<Use>(use)(*loan.value);
+      return status_;
+    }
+  }
+  /// A value with memory for the sequences of whatever the connected resource gives: for members that are read into. [setup]
+  T prototype() const { return std::move(*make()); }
 
   /// What the last read found, without reading; none before the first one. [rt]
   DataStatus status() const MAUVE_RT { return is_previewed() ? stand_in<ReadPort>().status_ : status_; }
@@ -55,16 +93,14 @@ class ReadPort final : public PortBase {
     }
   }
   bool read_serialized(std::vector<std::byte>& message, DataStatus& status, time_ns_t& time_ns) override {
-    auto value = std::make_unique<T>(default_);
+    auto value = make();
+    if constexpr (!kHasSequences<T>) *value = default_;
     status = read(*value, &time_ns);
     CdrWriter(message).put(*value);
     return true;
   }
 
  protected:
-  bool fits(const ServiceBase& service) const noexcept override {
-    return dynamic_cast<const ReadService<T>*>(&service) != nullptr;
-  }
   void attach(ServiceBase* service, BiasedMutex::Seat* seat) noexcept override {
     if (service_ != nullptr) service_->let_go(reader_);
     service_ = static_cast<ReadService<T>*>(service);  // fits() was asked
@@ -73,10 +109,34 @@ class ReadPort final : public PortBase {
     status_ = DataStatus::none;
   }
   std::unique_ptr<PortBase> make_stand_in() const override {
-    return std::make_unique<ReadPort>(name(), default_);
+    if constexpr (kHasSequences<T>) {
+      return std::make_unique<ReadPort>(name());
+    } else {
+      return std::make_unique<ReadPort>(name(), default_);
+    }
   }
 
  private:
+  /// A value of the service's, until the end of its use.
+  struct Loaned {
+    Loaned(ReadService<T>* from, ReaderState& by) MAUVE_RT
+        : service(from),
+          reader(by),
+          loan(from != nullptr ? from->lend(by) : Loan<T>{}) {}
+    ~Loaned() {
+      if (service != nullptr) service->end_loan(loan, reader);
+    }
+    Loaned(const Loaned&) = delete;
+    Loaned& operator=(const Loaned&) = delete;
+    ReadService<T>* service;
+    ReaderState& reader;
+    const Loan<T> loan;
+  };
+
+  std::unique_ptr<T> make() const {
+    if (is_previewed()) return stand_in<ReadPort>().make();
+    return service_ != nullptr ? service_->make() : std::make_unique<T>();
+  }
   // One variable in each function that returns a large value: a compiler then makes it in the caller's place.
   Sample<T> read_now() noexcept {
     Sample<T> sample = find();
@@ -143,6 +203,9 @@ class ReadPort final : public PortBase {
     } else {
       status_ = service_ != nullptr ? service_->read(value, time, reader_) : DataStatus::none;
     }
+    if constexpr (kHasSequences<T>) {
+      if (status_ != DataStatus::none && !service_->is_whole(value)) status_ = DataStatus::none;
+    }
     reader_.time_ns = time;
     if (time_ns != nullptr) *time_ns = time;
     return status_;
@@ -177,6 +240,34 @@ class WritePort final : public PortBase {
       keep_zero();
     return taken;
   }
+  /// Calls `fill` with a place of the resource's, then writes what is there; large values are not copied. The sequences come empty
+  /// with their memory, other fields of large values hold what an earlier value left. False, and `fill` not called, when the
+  /// resource has no place; a closed or unconnected port does nothing and says true, as write(). [rt] as far as `fill` is.
+  template <typename Fill>
+  bool write_with(Fill&& fill) {
+    if constexpr (!kIsLarge<T>) {
+      T value{};
+      std::forward<Fill>(fill)(value);
+      return write(value);
+    } else {
+      if (service_ == nullptr || is_closed() || is_previewed()) return true;
+      Borrowed borrowed(*service_, seat_);
+      if (borrowed.place == nullptr) return false;
+      detail::clear_sequences(*borrowed.place);
+      std::forward<Fill>(fill)(*borrowed.place);
+      if (is_special()) [[unlikely]] {
+        if (is_closed()) return true;
+        if (is_tapped()) tell_write(borrowed.place);
+        if (!admits(borrowed.place)) return true;
+      }
+      const bool taken = service_->publish(*std::exchange(borrowed.place, nullptr), stamp_ns(), seat_);
+      if (is_special()) [[unlikely]]
+        keep_zero();
+      return taken;
+    }
+  }
+  /// A value with memory for the sequences of whatever the connected resource takes: for members that are written. [setup]
+  T prototype() const { return std::move(*make()); }
   using PortBase::write_zero;
   void write_zero(time_ns_t time_ns) noexcept override {
     if (service_ == nullptr) return;
@@ -206,14 +297,11 @@ class WritePort final : public PortBase {
   std::vector<MessageShape> messages() const override { return message_shapes<T>(); }
 
   bool write_serialized(std::span<const std::byte> message) override {
-    auto value = std::make_unique<T>();
+    const auto value = make();
     return CdrReader(message).get(*value) && write(*value);
   }
 
  protected:
-  bool fits(const ServiceBase& service) const noexcept override {
-    return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
-  }
   void attach(ServiceBase* service, BiasedMutex::Seat* seat) noexcept override {
     service_ = static_cast<WriteService<T>*>(service);
     seat_ = seat;
@@ -223,6 +311,25 @@ class WritePort final : public PortBase {
   }
 
  private:
+  /// A place of the service's, until it is published.
+  struct Borrowed {
+    Borrowed(WriteService<T>& from, BiasedMutex::Seat* by) MAUVE_RT : service(from),
+                                                                      seat(by),
+                                                                      place(from.borrow(by)) {}
+    ~Borrowed() {
+      if (place != nullptr) service.give_back(*place, seat);
+    }
+    Borrowed(const Borrowed&) = delete;
+    Borrowed& operator=(const Borrowed&) = delete;
+    WriteService<T>& service;
+    BiasedMutex::Seat* seat;
+    T* place;
+  };
+
+  std::unique_ptr<T> make() const {
+    if (is_previewed()) return stand_in<WritePort>().make();
+    return service_ != nullptr ? service_->make() : std::make_unique<T>();
+  }
   // Out of line, as ReadPort::read_specially().
   [[gnu::noinline, gnu::cold]] bool write_specially(const T& value) noexcept {
     if (is_closed() || is_previewed()) return true;

@@ -175,8 +175,9 @@ class PortBase {
   virtual bool write_serialized(std::span<const std::byte> /*message*/) { return false; }
 
  protected:
-  /// Whether a service of equal kind and type name is of the C++ type this port needs.
-  virtual bool fits(const ServiceBase& service) const noexcept = 0;
+  /// Whether a service of equal kind and type name, and with messages that lie in memory as this port's, is of the class that
+  /// this port needs. Of data the messages say all.
+  virtual bool fits(const ServiceBase& /*service*/) const noexcept { return true; }
   /// Lets go of the old service and takes the new one, which fits, or none. `seat`: the place that it has given. [rt]
   virtual void attach(ServiceBase* service, BiasedMutex::Seat* seat) MAUVE_RT = 0;
   /// Another port of this type, for a preview; not connected.
@@ -239,6 +240,8 @@ class PortBase {
     return false;
   }
 
+  /// Throws Error (type_mismatch): its struct is not the service's.
+  void check_layout(const ServiceBase& service) const;
   const PortConnection& connection() const noexcept {
     return is_previewed() ? stand_in<PortBase>().connection_ : connection_;
   }

@@ -206,6 +206,10 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   virtual bool next_write(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/) { return false; }
   /// Writes that found no room there. [rt]
   virtual std::uint64_t lost_writes() const MAUVE_RT { return 0; }
+  /// Values that a write or a read refused, as a sequence had more elements than the capacity. [rt]
+  virtual std::uint64_t refused_values() const MAUVE_RT { return 0; }
+  /// Why the last of them was, in words; empty: none was. [non-rt]
+  virtual std::string why_refused_value() const { return ""; }
   /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
   /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }

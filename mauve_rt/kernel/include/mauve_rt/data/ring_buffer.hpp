@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/base/biased_mutex.hpp"
@@ -29,9 +30,13 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 /// copy of it does not suffice (P. Lee, T. Bu, G. Chandranmenon: "A lock-free, cache-efficient shared ring buffer", 2009). One that overwrites has one lock
 /// for both ends, without a bias: its writer removes elements too. tests/models/loom explores the queue and its biased mutex.
 ///
+/// Large elements lie in blocks, and a place has the address of one: whoever writes fills a spare block and exchanges it for that
+/// of the place, whoever reads takes the place's block for a spare one. So nothing is copied under a lock.
+///
 /// | member            | written by | read by    | under / order                                                    |
 /// | ----------------- | ---------- | ---------- | ---------------------------------------------------------------- |
 /// | places_           | writers    | readers    | a place between head_ and tail_ is its reader's, else its writer's |
+/// | spare blocks      | each end   | each end   | the mutex of that end; blocks_: who prepares a connection, room_mutex_ |
 /// | Writers::tail     | writers    | readers    | write.mutex(); release / acquire: publishes the place           |
 /// | Readers::head     | readers    | writers    | readers_mutex_; release / acquire: the place may be filled again |
 /// | the rest of both  | the same   | the same   | that mutex                                                       |
@@ -40,13 +45,20 @@ template <Described T>
 class RingBuffer final : public LoggedResource<T, Resource> {
  public:
   /// Throws Error (invalid_argument) without a capacity. [setup]
-  explicit RingBuffer(std::size_t capacity, WhenFull when_full = WhenFull::refuse)
-      : LoggedResource<T, Resource>("ring_buffer", type_name<T>()), places_(capacity), when_full_(when_full) {
+  explicit RingBuffer(std::size_t capacity, WhenFull when_full = WhenFull::refuse, Capacities capacities = {})
+      : LoggedResource<T, Resource>("ring_buffer", type_name<T>(), std::move(capacities)),
+        places_(capacity),
+        when_full_(when_full) {
     if (capacity == 0) {
       throw Error(ErrorCode::invalid_argument, "a ring_buffer needs a capacity",
                   {.element = "capacity", .expected = "> 0", .found = "0", .remedy = "add capacity: N"});
     }
     if (overwrites()) write.mutex().share();
+    if constexpr (kIsLarge<T>) {
+      for (Place& place : places_) place.value = new_block();
+      add_spares(writers_.spares, write.mutex(), kOtherUsers);
+      add_spares(readers_.spares, readers_mutex(), kOtherUsers);
+    }
     this->offer(read);
     this->offer(write);
   }
@@ -63,7 +75,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   std::uint64_t lost() const MAUVE_RT { return writers_.lost.load(std::memory_order_relaxed); }
 
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
-    auto value = std::make_unique<T>();
+    const auto value = read.make();
     ReaderState reader{.seen = seen};
     if (pop(*value, time_ns, reader) != DataStatus::new_data) return false;
     seen = reader.seen;
@@ -72,11 +84,11 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   }
   /// The element written last; a reader may have removed it.
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
-    auto value = std::make_unique<T>();
+    const auto value = read.make();
     {
       const LockGuard lock(write.mutex());
       const Place& newest = places_[(writers_.place == 0 ? places_.size() : writers_.place) - 1];
-      *value = newest.value;
+      *value = newest.get();
       time_ns = newest.time_ns;
       sequence = writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
     }
@@ -84,22 +96,34 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     return sequence != 0;
   }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
-    auto value = std::make_unique<T>();
+    const auto value = write.make();
     return CdrReader(message).get(*value) && write.write(*value, time_ns);
   }
   std::string why_refused(std::span<const std::byte> message) const override {
-    const auto value = std::make_unique<T>();
+    const auto value = write.make();
     return CdrReader(message).get(*value)
                ? "the ring_buffer was full: " + std::to_string(capacity()) + " elements"
-               : Resource::why_refused(message);
+               : LoggedResource<T, Resource>::why_refused(message);
   }
 
  private:
   static constexpr std::size_t kCacheLine = 64;
 
+  static constexpr std::size_t kOtherUsers = 2;  // of an end, without a port: a topic, and who looks at messages
+  using Block = std::conditional_t<kIsLarge<T>, T*, T>;
+  using Spares = std::vector<T*>;
+
   struct Place {
-    T value{};
+    Block value{};
     time_ns_t time_ns{0};
+
+    const T& get() const noexcept {
+      if constexpr (kIsLarge<T>) {
+        return *value;
+      } else {
+        return value;
+      }
+    }
   };
   /// Elements are counted from 1 on, by their sequence.
   struct alignas(kCacheLine) Writers {
@@ -107,11 +131,13 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     std::uint64_t head{0};          // as seen last
     std::size_t place{0};           // of the next element
     Atomic<std::uint64_t> lost{0};
+    Spares spares;
   };
   struct alignas(kCacheLine) Readers {
     Atomic<std::uint64_t> head{0};  // elements removed so far
     std::uint64_t tail{0};          // as seen last
     std::size_t place{0};           // of the oldest element
+    Spares spares;
   };
   class Read final : public ReadService<T> {
    public:
@@ -126,6 +152,22 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     }
     void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.readers_mutex_.remove(seat); }
     bool is_wait_free() const noexcept override { return owner_.readers_mutex_.is_biased(); }
+    bool lends(const ReaderState& /*reader*/) const noexcept override { return kIsLarge<T>; }
+    Loan<T> lend(ReaderState& reader) noexcept override {
+      if constexpr (kIsLarge<T>) {
+        return owner_.lend(reader);
+      } else {
+        return {};
+      }
+    }
+    void end_loan(const Loan<T>& loan, ReaderState& reader) noexcept override {
+      if constexpr (kIsLarge<T>) owner_.end_loan(loan, reader);
+    }
+    std::unique_ptr<T> make() const override { return owner_.limits().make(); }
+    bool is_whole(const T& value) noexcept override { return owner_.limits().admits(value); }
+    void make_room(std::uint32_t ports) override {
+      if constexpr (kIsLarge<T>) owner_.make_spares(owner_.readers_.spares, owner_.readers_mutex(), ports);
+    }
 
    private:
     RingBuffer& owner_;
@@ -135,25 +177,57 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   BiasedMutex& writers() noexcept override { return write.mutex(); }
   bool overwrites() const noexcept { return when_full_ == WhenFull::overwrite; }
 
+  BiasedMutex& readers_mutex() noexcept { return overwrites() ? write.mutex() : readers_mutex_; }
+
   DataStatus pop(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-    const BiasedMutex::Hold hold(overwrites() ? write.mutex() : readers_mutex_, reader.seat);
+    if constexpr (kIsLarge<T>) {
+      const Loan<T> loan = lend(reader);
+      if (loan.status == DataStatus::new_data) value = *loan.value;  // not under the lock
+      if (loan.status != DataStatus::none) time_ns = loan.time_ns;
+      end_loan(loan, reader);
+      return loan.status;
+    }
+    Loan<T> oldest;
+    const BiasedMutex::Hold hold(readers_mutex(), reader.seat);
+    if (!find_oldest(oldest, reader)) {
+      if (oldest.status != DataStatus::none) time_ns = oldest.time_ns;
+      return oldest.status;
+    }
+    value = *oldest.value;
+    time_ns = oldest.time_ns;
+    remove(readers_.head.load(std::memory_order_relaxed));  // relaxed: written under this lock
+    return DataStatus::new_data;
+  }
+  /// Under the readers' lock; whether there is one, which stays.
+  bool find_oldest(Loan<T>& found, ReaderState& reader) noexcept {
     const std::uint64_t head =
         readers_.head.load(std::memory_order_relaxed);  // relaxed: written under this lock
     if (readers_.tail <= head) {  // less: the writer has overwritten elements since the last look
       readers_.tail = writers_.tail.load(std::memory_order_acquire);
       if (readers_.tail == head) {
-        if (reader.seen == 0) return DataStatus::none;
-        time_ns = reader.time_ns;
-        return DataStatus::old_data;
+        if (reader.seen != 0) found = {nullptr, DataStatus::old_data, reader.time_ns};
+        return false;
       }
     }
     MAUVE_AUDIT(readers_.tail > head && readers_.tail - head <= places_.size());
     const Place& place = places_[readers_.place];
-    value = place.value;
-    time_ns = place.time_ns;
-    remove(head);
+    found = {&place.get(), DataStatus::new_data, place.time_ns};
     reader.seen = head + 1;
-    return DataStatus::new_data;
+    return true;
+  }
+  Loan<T> lend(ReaderState& reader) noexcept {
+    Loan<T> loan;
+    const BiasedMutex::Hold hold(readers_mutex(), reader.seat);
+    if (readers_.spares.empty() || !find_oldest(loan, reader)) return loan;
+    std::swap(places_[readers_.place].value, readers_.spares.back());
+    readers_.spares.pop_back();
+    remove(readers_.head.load(std::memory_order_relaxed));  // relaxed: written under this lock
+    return loan;
+  }
+  void end_loan(const Loan<T>& loan, ReaderState& reader) noexcept {
+    if (loan.value == nullptr) return;
+    const BiasedMutex::Hold hold(readers_mutex(), reader.seat);
+    MAUVE_RT_TRUSTED(readers_.spares.push_back(const_cast<T*>(loan.value)));  // within its capacity: add_spares()
   }
   /// The oldest; under the readers' lock.
   void remove(std::uint64_t head) noexcept {
@@ -161,8 +235,40 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     if (++readers_.place == places_.size()) readers_.place = 0;
     readers_.head.store(head + 1, std::memory_order_release);
   }
-  /// Under the writers' lock.
+  // The next four: under the writers' lock.
+
+  T* borrow() noexcept {
+    if (writers_.spares.empty()) return nullptr;
+    T* const place = writers_.spares.back();
+    writers_.spares.pop_back();
+    return place;
+  }
+  void give_back(T& place) noexcept {
+    MAUVE_RT_TRUSTED(writers_.spares.push_back(&place));  // within its capacity: add_spares()
+  }
+  bool publish(T& value, time_ns_t time_ns) noexcept {
+    T* block = &value;
+    const bool is_taken = has_room();
+    if (is_taken) {
+      this->log(value, time_ns);
+      std::swap(places_[writers_.place].value, block);
+      add(time_ns);
+    }
+    give_back(*block);
+    return is_taken;
+  }
   bool take(const T& value, time_ns_t time_ns) noexcept {
+    if (!has_room()) return false;
+    if constexpr (kIsLarge<T>) {
+      *places_[writers_.place].value = value;
+    } else {
+      places_[writers_.place].value = value;
+    }
+    this->log(value, time_ns);
+    add(time_ns);
+    return true;
+  }
+  bool has_room() noexcept {
     const std::uint64_t tail =
         writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
     if (tail - writers_.head == places_.size()) {
@@ -174,19 +280,46 @@ class RingBuffer final : public LoggedResource<T, Resource> {
       }
     }
     MAUVE_AUDIT(tail - writers_.head < places_.size());
-    Place& place = places_[writers_.place];
-    place.value = value;
-    place.time_ns = time_ns;
-    if (++writers_.place == places_.size()) writers_.place = 0;
-    writers_.tail.store(tail + 1, std::memory_order_release);
-    this->log(value, time_ns);
     return true;
   }
+  void add(time_ns_t time_ns) noexcept {
+    places_[writers_.place].time_ns = time_ns;
+    if (++writers_.place == places_.size()) writers_.place = 0;
+    const std::uint64_t tail = writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
+    writers_.tail.store(tail + 1, std::memory_order_release);
+  }
+
+  T* new_block() {
+    blocks_.push_back(this->limits().make());
+    return blocks_.back().get();
+  }
+  /// For an end that so many ports use. [non-rt]
+  void make_spares(Spares& spares, BiasedMutex& mutex, std::size_t ports) {
+    const LockGuard lock(room_mutex_);
+    std::size_t spare = 0;
+    {
+      const LockGuard no_user(mutex);
+      spare = spares.size();
+    }
+    // What is lent now may be of one that was left behind in a state that hangs.
+    if (spare < ports + kOtherUsers) add_spares(spares, mutex, ports + kOtherUsers - spare);
+  }
+  void add_spares(Spares& spares, BiasedMutex& mutex, std::size_t count) {
+    Spares more;
+    more.reserve(blocks_.size() + count);  // all that there are: any of them may come back here
+    while (count-- > 0) more.push_back(new_block());
+    const LockGuard no_user(mutex);
+    more.insert(more.end(), spares.begin(), spares.end());
+    spares.swap(more);
+  }
+  void make_room_to_write(std::uint32_t ports) { make_spares(writers_.spares, write.mutex(), ports); }
 
   Writers writers_;
   Readers readers_;
   std::vector<Place> places_;
   WhenFull when_full_;
+  Mutex room_mutex_;
+  std::vector<std::unique_ptr<T>> blocks_;  // of large elements: those of the places, and spare ones of each end
   alignas(kCacheLine) BiasedMutex readers_mutex_;
 
  public:
@@ -216,7 +349,8 @@ struct RingBufferKind {
   static std::unique_ptr<Resource> make(const ResourceParameters& given) {
     return std::make_unique<RingBuffer<T>>(
         static_cast<std::size_t>(get<std::int64_t>(given, "capacity")),
-        get<bool>(given, "overwrite") ? WhenFull::overwrite : WhenFull::refuse);
+        get<bool>(given, "overwrite") ? WhenFull::overwrite : WhenFull::refuse,
+        capacities_of(message_shape<T>(), given));
   }
 };
 

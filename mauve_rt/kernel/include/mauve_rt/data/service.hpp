@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <string_view>
@@ -12,6 +13,7 @@
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/time.hpp"
+#include "mauve_rt/data/capacities.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 
 namespace mauve {
@@ -47,6 +49,14 @@ struct Sample {
   time_ns_t age_ns(time_ns_t now_ns) const MAUVE_RT {
     return status == DataStatus::none ? 0 : now_ns - time_ns;
   }
+};
+
+/// A value where it lies.
+template <typename T>
+struct Loan {
+  const T* value{nullptr};  // nullptr: there is none
+  DataStatus status{DataStatus::none};
+  time_ns_t time_ns{0};
 };
 
 /// The identity of a type: MAUVE_TYPE's name. [non-rt]
@@ -198,10 +208,23 @@ class ReadService : public ServiceBase {
   virtual DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT = 0;
   /// The same by value, `fallback` when there is nothing; override it where that saves a copy. [rt]
   virtual Sample<T> sample(const T& fallback, ReaderState& reader) MAUVE_RT {
-    Sample<T> found{.value = fallback};
-    found.status = read(found.value, found.time_ns, reader);
-    return found;
+    if constexpr (kHasSequences<T>) {
+      return {};  // no port asks: a copy would allocate
+    } else {
+      Sample<T> found{.value = fallback};
+      found.status = read(found.value, found.time_ns, reader);
+      return found;
+    }
   }
+  /// Whether lend() gives this reader values in place; else who reads large ones copies them. [rt]
+  virtual bool lends(const ReaderState& /*reader*/) const MAUVE_RT { return false; }
+  /// As read(), without a copy: nothing changes the value until end_loan(). [rt]
+  virtual Loan<T> lend(ReaderState& /*reader*/) MAUVE_RT { return {}; }
+  virtual void end_loan(const Loan<T>& /*loan*/, ReaderState& /*reader*/) MAUVE_RT {}
+  /// A value with memory for whatever the service gives. [setup]
+  virtual std::unique_ptr<T> make() const { return std::make_unique<T>(); }
+  /// Whether a copy that was read is whole: had memory enough; counts those that are not. [rt]
+  virtual bool is_whole(const T& /*value*/) MAUVE_RT { return true; }
   /// The register that a port with a seat may read by itself, at a third of a call's price; nullptr: there is none. [rt]
   virtual LatestRegister<T>* latest() MAUVE_RT { return nullptr; }
   /// Gives back what is held for a reader that goes; the state is fresh afterwards, but for its seat. [rt]
@@ -223,6 +246,13 @@ class WriteService : public ServiceBase {
   virtual TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) MAUVE_RT {
     return TryWrite::must_wait;
   }
+  /// A place for the writer to fill without a lock, then publish() or give_back(); nullptr: there is none. [rt]
+  virtual T* borrow(BiasedMutex::Seat* /*seat*/) MAUVE_RT { return nullptr; }
+  /// As write(), of what was borrowed. [rt]
+  virtual bool publish(T& /*place*/, time_ns_t /*time_ns*/, BiasedMutex::Seat* /*seat*/) MAUVE_RT { return false; }
+  virtual void give_back(T& /*place*/, BiasedMutex::Seat* /*seat*/) MAUVE_RT {}
+  /// A value with memory for whatever the service takes. [setup]
+  virtual std::unique_ptr<T> make() const { return std::make_unique<T>(); }
 };
 
 template <typename Signature>

@@ -14,7 +14,9 @@ namespace mauve {
 template <Described T>
 class SharedData final : public NewestValue<T> {
  public:
-  SharedData() : NewestValue<T>("shared_data", {}, 0) {}
+  /// `capacities`: of the sequences of T. [setup]
+  explicit SharedData(Capacities capacities = {})
+      : NewestValue<T>("shared_data", {}, 0, std::move(capacities)) {}
 };
 
 /// As architectures name and make it. All functions [setup].
@@ -28,8 +30,8 @@ struct SharedDataKind {
             5};  // its newest, one that is being written, one for others than ports, and one on its way in and one out
   }
   template <Described T>
-  static std::unique_ptr<Resource> make(const ResourceParameters&) {
-    return std::make_unique<SharedData<T>>();
+  static std::unique_ptr<Resource> make(const ResourceParameters& given) {
+    return std::make_unique<SharedData<T>>(capacities_of(message_shape<T>(), given));
   }
 };
 

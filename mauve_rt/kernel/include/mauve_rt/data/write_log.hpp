@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -45,12 +46,14 @@ class WriteLog {
   static constexpr std::size_t kFewest = 16;
   static constexpr std::size_t kMost = 8192;
 
-  /// Keeps writes from now on, in about so many bytes; again: in a new place, what waited is gone. [non-rt]
+  /// Keeps writes from now on, in about so many bytes; again: in a new place, what waited is gone. `prepare`: gives a place what
+  /// memory it needs. [non-rt]
   template <typename Lock>
   void open(std::size_t bytes, Lock& writers, std::size_t place_bytes = sizeof(Place),
-            const Place& blank = {}) {
+            const std::function<void(Place&)>& prepare = {}) {
     auto made = std::make_unique<Ring>();
-    made->places.assign(std::clamp(bytes / place_bytes, kFewest, kMost), blank);
+    made->places = std::vector<Place>(std::clamp(bytes / place_bytes, kFewest, kMost));
+    if (prepare) std::for_each(made->places.begin(), made->places.end(), prepare);
     exchange(std::move(made), writers);
   }
   /// Keeps no more. [non-rt]

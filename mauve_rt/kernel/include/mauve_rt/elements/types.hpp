@@ -6,8 +6,8 @@
 
 #include "mauve_rt/data/cdr.hpp"
 
-/// A type's identity is its name, and one name is one C++ struct: whoever needs one of these messages uses the
-/// struct from here. Units as in ROS: m, rad, m/s, rad/s.
+/// A type's identity is its name and its layout: ports of these structs connect to any other ones of the same message that have
+/// the same fields in the same places. Units as in ROS: m, rad, m/s, rad/s.
 namespace mauve::types {
 
 struct Bool {
