@@ -2,6 +2,7 @@
 #include "mauve_rt/data/capacities.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <string_view>
 
 #include "mauve_rt/base/error.hpp"
@@ -102,16 +103,17 @@ Capacities capacities_of(const MessageShape& message, const ResourceParameters& 
     }
     capacities[*path] = checked_capacity(name, value);
   }
-  for (const std::string& path : paths) {
-    if (capacities.contains(path)) continue;
-    throw Error(ErrorCode::invalid_argument,
-                "a resource of type " + message.type + " needs a capacity for each sequence",
-                {.element = std::string(kPrefix) + path,
-                 .expected = "how many elements it holds at most",
-                 .found = "none",
-                 .remedy = "add capacity: {" + path + ": N}"});
-  }
-  return capacities;
+  std::vector<std::string> missing;
+  std::copy_if(paths.begin(), paths.end(), std::back_inserter(missing),
+               [&](const std::string& path) { return !capacities.contains(path); });
+  if (missing.empty()) return capacities;
+  std::string remedy;
+  for (const std::string& path : missing) remedy += (remedy.empty() ? "" : ", ") + path + ": N";
+  throw Error(ErrorCode::invalid_argument, "each sequence of " + message.type + " needs a capacity",
+              {.element = std::string(kPrefix) + missing.front(),
+               .expected = "how many elements it holds at most",
+               .found = "none",
+               .remedy = "add capacity: {" + remedy + "}"});
 }
 
 std::size_t value_bytes(const MessageShape& message, const Capacities& capacities) {

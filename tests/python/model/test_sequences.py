@@ -14,7 +14,7 @@ from mauve_rt.cli.main import main
 from mauve_rt.control.limits import bytes_of_resource
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import build, configure, load_architecture
-from mauve_rt.model.plugins import PluginLoader
+from mauve_rt.model.plugins import PluginIndex, PluginLoader
 
 CAPACITY = "capacity: {name: 4, position: 4, velocity: 4, effort: 4}"
 GOOD = f"""\
@@ -63,13 +63,13 @@ def test_a_core_reads_and_writes_sequences_in_place(tmp_path: Path, plugin_prefi
 
 
 BAD = {
-    "none": (f", {CAPACITY}", "", "joints: {", "needs a capacity for each sequence, at capacity.effort"),
+    "none": (f", {CAPACITY}", "", "joints: {", "needs a capacity, at capacity.name: expected how many elements it holds at most, found none; add "),
     "one lacks": (", effort: 4}", "}", "joints: {", "at capacity.effort"),
     "unknown": ("effort: 4}", "efort: 4, effort: 4}", "joints: {", "no such sequence, at capacity.efort: expected one of"),
     "zero": ("{name: 4", "{name: 0", "0", "expected at least 1, found 0"),
     "no number": ("{name: 4", "{name: many", "many", "expected a whole number, found 'many'"),
     "latest value": ("joints: {kind: shared_data", "joints: {kind: latest_value", "sensor", "one with sequences"),
-    "ring without length": ("capacity: 3, ", "", "turned: {", "lacks"),
+    "ring without length": ("capacity: 3, ", "", "turned: {", "resource 'turned' has no capacity"),
 }
 
 
@@ -87,13 +87,13 @@ def test_a_bad_capacity_is_refused_at_its_place(case: str, tmp_path: Path, plugi
 
 def test_capacities_of_a_program(plugin_prefix: Path) -> None:
     registry = PluginRegistry()
-    loader = PluginLoader(registry)
+    loader = PluginLoader(registry, PluginIndex.installed())
     loader.require("core", "executor_tests/JointTurner")
     architecture = Architecture(registry)
     architecture.add_resource("one", kind="shared_data", type=TYPE, capacity=FOUR)
     architecture.add_resource("two", SharedData(JointState, capacities=FOUR))
     architecture.add_resource("three", RingBuffer(JointState, 2, capacities=FOUR))
-    with pytest.raises(MauveError, match=r"capacity for each sequence.*capacity.effort"):
+    with pytest.raises(MauveError, match=r"each sequence of sensor_msgs/msg/JointState needs a capacity"):
         architecture.add_resource("four", SharedData(JointState))
     with pytest.raises(MauveError, match="one with sequences"):
         architecture.add_resource("five", LatestValue(JointState))
@@ -108,7 +108,7 @@ def test_the_check_says_what_the_values_take(
     said = capsys.readouterr().out
     model = load_architecture(tmp_path / "robot.yaml")
     registry = PluginRegistry()
-    PluginLoader(registry).require("core", "executor_tests/JointTurner")
+    PluginLoader(registry, PluginIndex.installed()).require("core", "executor_tests/JointTurner")
     for name, resource in model.resources.items():
         assert f"resource '{name}' takes {bytes_of_resource(resource, registry):,} bytes" in said
 
@@ -116,7 +116,7 @@ def test_the_check_says_what_the_values_take(
 def test_structs_of_two_libraries_for_one_message_are_connected(plugin_prefix: Path) -> None:
     """The resource has the struct of the library that was loaded first, the port that of the other one."""
     registry = PluginRegistry()
-    loader = PluginLoader(registry)
+    loader = PluginLoader(registry, PluginIndex.installed())
     loader.require("core", "mauve_examples/Metronome")
     architecture = Architecture(registry)
     architecture.add_resource("place", kind="shared_data", type="geometry_msgs/msg/Point")
