@@ -205,17 +205,17 @@ class Machines:
 
     def end(self, condition: str) -> list[Ending]:
         """Let each cause end its outputs, one cause after another, and the executor with the last."""
-        caused_s = {cause: self._cause(cause) for cause in CAUSES}
-        time.sleep(SETTLED_S)
         reached = (LOCAL,) if condition in (STALLED, CUT) else (LOCAL, REMOTE)
-        return [
-            Ending(
-                cause, quality, host, caused_s[cause], self._received(host, quality, cause, caused_s[cause])
-            )
-            for cause in CAUSES
-            for quality in QUALITIES
-            for host in reached
-        ]
+        endings = []
+        for cause in CAUSES:
+            caused_s = self._cause(cause)
+            time.sleep(SETTLED_S)
+            endings += [
+                Ending(cause, quality, host, caused_s, self._received(host, quality, cause, caused_s))
+                for quality in QUALITIES
+                for host in reached
+            ]
+        return endings
 
     def restore(self, condition: str) -> None:
         """Let a condition end."""
