@@ -34,6 +34,7 @@ STALLED, CUT = "stalled interface", "cut cable"
 LOCAL, REMOTE = "robot", "remote"
 PERIOD_MS, TIMEOUT_S = 4, 0.3
 IMPAIRED_S = 1.0
+PATIENCE_S = 5.0
 SETTLED_S = 0.4  # a reliable publisher repairs the output of a stop for 0.2 s
 _RANGE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}
 _RECORDER = Path(__file__).with_name("recorder_of_outputs.py")
@@ -209,7 +210,7 @@ class Machines:
         endings = []
         for cause in CAUSES:
             caused_s = self._cause(cause)
-            time.sleep(SETTLED_S)
+            self._settle(reached, f"reliable/{cause}", caused_s)
             endings += [
                 Ending(cause, quality, host, caused_s, self._received(host, quality, cause, caused_s))
                 for quality in QUALITIES
@@ -252,7 +253,7 @@ class Machines:
         return self.listeners[host].received(f"{quality}/{cause}", since_s)
 
     def _cause(self, cause: str) -> float:
-        """The instant of the cause, s; returns when the local listener has received the safe value."""
+        """Let it come; returns its instant, s."""
         local, began_s = self.listeners[LOCAL], time.monotonic()
         if cause in _ORDERS:
             topic, value = _ORDERS[cause]
@@ -263,9 +264,17 @@ class Machines:
             assert self._executor is not None
             status, _ = self._executor.end(signal.SIGTERM)
             assert status == 0, self._executor.output
-        reliable = f"reliable/{cause}"
-        wait_until(lambda: [message.value for message in local.received(reliable, began_s)[-1:]] == [0.0])
         return began_s
+
+    def _settle(self, hosts: tuple[str, ...], output: str, since_s: float) -> None:
+        """Wait for the safe value, as a computer may let listeners wait, and for repairs and copies."""
+        until_s = time.monotonic() + PATIENCE_S
+        while time.monotonic() < until_s:
+            last = [self.listeners[host].received(output, since_s)[-1:] for host in hosts]
+            if all(messages and messages[0].value == 0.0 for messages in last):
+                break
+            time.sleep(0.01)
+        time.sleep(SETTLED_S)
 
     def _wait_until(self, condition: Callable[[], object]) -> None:
         executor = self._executor
