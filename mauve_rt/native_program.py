@@ -1,4 +1,4 @@
-"""Native programs that the executor starts, and that outlive a crash of it: where they are, and their start."""
+"""Native programs that the executor starts and that outlive a crash of it: their places, and their start."""
 
 import os
 import signal

@@ -17,7 +17,7 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kMessagesAtOnce = 64;  // messages that one wait takes of a topic
+constexpr int kMessagesAtOnce = 64;                 // messages that one wait takes of a topic
 constexpr time_ns_t kExplainEvery = ms_to_ns(100);  // a flood of messages is not looked at one by one
 
 std::string described(const TopicSettings& settings) {

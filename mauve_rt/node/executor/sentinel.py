@@ -1,6 +1,6 @@
 """The sentinel: a process that publishes safe outputs when native code has crashed the executor.
 
-mauve_rt/bridge/sentinel/sentinel.cpp is the other side. It learns here which outputs a stop would write, and
+mauve_rt/sentinel/sentinel.cpp is the other side. It learns here which outputs a stop would write, and
 between activation and a stop that they are not safe.
 """
 

@@ -39,10 +39,10 @@
 #include "mauve_rt/base/seam/sleep.hpp"
 #include "mauve_rt/base/time.hpp"
 
-#include "../src/copies.hpp"
-#include "../src/owned.hpp"
-#include "../src/rcl_error.hpp"
-#include "../src/type_support.hpp"
+#include "../bridge/src/copies.hpp"
+#include "../bridge/src/owned.hpp"
+#include "../bridge/src/rcl_error.hpp"
+#include "../bridge/src/type_support.hpp"
 
 namespace mauve::bridge {
 
@@ -86,7 +86,8 @@ class Unpacked {
 };
 
 rmw_time_t duration(std::int64_t ns) {
-  return {.sec = static_cast<std::uint64_t>(ns / s_to_ns(1)), .nsec = static_cast<std::uint64_t>(ns % s_to_ns(1))};
+  return {.sec = static_cast<std::uint64_t>(ns / s_to_ns(1)),
+          .nsec = static_cast<std::uint64_t>(ns % s_to_ns(1))};
 }
 
 /// What one output is published with.
