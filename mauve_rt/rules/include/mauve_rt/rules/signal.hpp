@@ -19,7 +19,6 @@ namespace mauve::rules {
 
 /// What a signal tells of.
 enum class SignalKind : std::uint8_t {
-<<<<<<< HEAD
   message,        // of a topic: one has come; the value means nothing
   write,          // of a resource: it was written; the value means nothing
   arrival,        // of a topic: one has come, perhaps not to be read yet; the value means nothing
@@ -28,16 +27,6 @@ enum class SignalKind : std::uint8_t {
   late,           // of a component: how many wake-ups or responses were late
   release,        // of a component: it was released; the value means nothing
   state,          // of a component: its ComponentState
-=======
-  message,   // of a topic: one has come; the value means nothing
-  write,     // of a resource: it was written; the value means nothing
-  arrival,   // of a topic: one has come, by whatever way, perhaps not to be read yet; the value means nothing
-  field,     // of a topic or resource (detail: the field's path): the field's value
-  overruns,  // of a component: how many there were
-  late,      // of a component: how many wake-ups or responses were late
-  release,   // of a component: it was released; the value means nothing
-  state,     // of a component: its ComponentState
->>>>>>> ef2e4b2 (Move the sentinel out of the bridge, and wait in its tests until listeners know it)
   over_declared,  // of a component: how many executions lasted longer than declared
   peer,           // of an executor: a PeerState
   diagnostic,     // of a status by its name: its level
