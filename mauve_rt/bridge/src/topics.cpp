@@ -4,12 +4,12 @@
 #include <rcl/error_handling.h>
 
 #include <algorithm>
+#include <array>
 #include <span>
 
 #include "mauve_rt/base/seam/guards.hpp"
 #include "mauve_rt/base/time.hpp"
 
-#include "copies.hpp"
 #include "rcl_error.hpp"
 #include "type_support.hpp"
 
@@ -17,7 +17,13 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kMessagesAtOnce = 64;                 // messages that one wait takes of a topic
+constexpr int kMessagesAtOnce = 64;  // messages that one wait takes of a topic
+// Of a stop's output on a best-effort topic, after its first message: a loss that lasts for some ms does not take them all.
+constexpr std::array kCopies{ms_to_ns(5), ms_to_ns(20)};
+// Of a reliable topic, while it is not acknowledged: only a message makes the middleware report soon what it has sent, else
+// listeners ask for a lost one seconds later. So long takes an acknowledgement; and as often as a bad cable needs.
+constexpr time_ns_t kRepairEvery = ms_to_ns(10);
+constexpr std::size_t kRepairs = 20;
 constexpr time_ns_t kExplainEvery = ms_to_ns(100);  // a flood of messages is not looked at one by one
 
 std::string described(const TopicSettings& settings) {
@@ -89,6 +95,12 @@ time_ns_t OutgoingTopic::send_stops(bool may_wait) {
   return copy_due_ns_.load(std::memory_order_relaxed);
 }
 
+/// How long after the first message of a stop's output the next copy is due; kForever: there is none.
+time_ns_t OutgoingTopic::copy_after_ns() const {
+  if (is_reliable_) return copies_ < kRepairs ? static_cast<time_ns_t>(copies_ + 1) * kRepairEvery : kForever;
+  return copies_ < kCopies.size() ? kCopies[copies_] : kForever;
+}
+
 /// Whether there was one.
 bool OutgoingTopic::send_next() {
   time_ns_t time_ns = 0;
@@ -99,7 +111,7 @@ bool OutgoingTopic::send_next() {
   message_.swap(stopped_);
   stopped_sent_ns_ = monotonic_now_ns();
   copies_ = 0;
-  copy_due_ns_.store(stopped_sent_ns_ + copy_after_ns(is_reliable_, copies_), std::memory_order_relaxed);
+  copy_due_ns_.store(stopped_sent_ns_ + copy_after_ns(), std::memory_order_relaxed);
   return true;
 }
 
@@ -109,7 +121,7 @@ void OutgoingTopic::repeat() {
   if (!is_reliable_ || !went_well(rcl_publisher_wait_for_all_acked(publisher_.get(), 0))) {
     publish(stopped_);
     ++copies_;
-    after_ns = copy_after_ns(is_reliable_, copies_);
+    after_ns = copy_after_ns();
   }
   copy_due_ns_.store(after_ns == kForever ? kForever : stopped_sent_ns_ + after_ns,
                      std::memory_order_relaxed);

@@ -74,6 +74,7 @@ class OutgoingTopic final : public BoundTopic {
   bool send_next() MAUVE_REQUIRES(mutex_);
   void publish(std::vector<std::byte>& message) MAUVE_REQUIRES(mutex_);
   void repeat() MAUVE_REQUIRES(mutex_);
+  time_ns_t copy_after_ns() const MAUVE_REQUIRES(mutex_);
   std::string full_name() const override { return rcl_publisher_get_topic_name(publisher_.get()); }
   const TopicEvents& events() const override { return events_; }
 

@@ -10,7 +10,7 @@ import socket
 import struct
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +31,7 @@ _PROGRAM = "sentinel"
 
 
 class Sentinel:
-    """The other process, from configure() to close(). Any thread may call.
-
-    | member     | written by                  | under   |
-    | ---------- | --------------------------- | ------- |
-    | all        | any thread                  | `_lock` |
-    """
+    """The other process, from configure() to close(). Any thread may call; `_lock` protects every member."""
 
     def __init__(self, node: Any, runtime: Runtime, bound: BoundResources) -> None:
         self._node = node
@@ -45,43 +40,42 @@ class Sentinel:
         self._lock = threading.Lock()
         self._socket: socket.socket | None = None
         self._process = 0
-        self._sent = b""  # the list of outputs
-        self._count = 0
-        self._awaited = 0  # answers
+        self._sent: list[bytes] = []  # the outputs
+        self._awaited = 0  # answers to lists of outputs
+        self._subscribers = 0
         self._problem: str | None = None  # None: there is no sentinel
 
     def configure(self) -> None:
         """Start the process where the architecture wants one; it makes its publishers meanwhile."""
-        if not self._runtime.model.sentinel:
-            return
-        with self._lock:
-            try:
+        if self._runtime.model.sentinel:
+            with self._open():
                 self._start()
-            except OSError as error:
-                self._fail(f"it cannot be started ({error.strerror})")
-                return
-            self._follow()
+                self._follow()
 
     def arm(self) -> None:
         """Outputs are not safe from now on; waits for the publishers, for 2 s at most."""
-        with self._lock:
+        with self._open() as its_socket:
+            if its_socket is None:
+                return
             self._follow()
             until_s = time.monotonic() + _READY_S
-            while self._awaited and self._socket is not None and time.monotonic() < until_s:
-                self._take_answers(wait_s=max(until_s - time.monotonic(), 0.0))
-            if self._awaited and self._socket is not None:
+            while self._awaited > 0 and (left_s := until_s - time.monotonic()) > 0.0:
+                self._take_answer(its_socket, wait_s=left_s)
+            if self._awaited > 0:
                 self._report(f"its publishers are not ready after {_READY_S:g} s")
-            self._send(_UNSAFE)
+            its_socket.send(_UNSAFE)
 
     def disarm(self) -> None:
         """Outputs are safe."""
-        with self._lock:
-            self._send(_SAFE)
+        with self._open() as its_socket:
+            if its_socket is not None:
+                its_socket.send(_SAFE)
 
     def follow(self) -> None:
         """Send the present outputs, if others were sent before, and notice the end of the process."""
-        with self._lock:
-            self._take_answers(wait_s=0.0)
+        with self._open() as its_socket:
+            while its_socket is not None and self._take_answer(its_socket, wait_s=0.0):
+                pass
             self._follow()
 
     def status(self) -> tuple[str, bool] | None:
@@ -89,12 +83,14 @@ class Sentinel:
         with self._lock:
             if self._problem is None:
                 return None
-            return self._problem or f"watches {counted(self._count, 'output')}", not self._problem
+            outputs, subscribers = len(self._sent), self._subscribers
+            watches = f"watches {counted(outputs, 'output')}, {counted(subscribers, 'subscriber')}"
+            return self._problem or watches, not self._problem
 
     def close(self) -> None:
         """End the process. May be called again."""
+        self.disarm()
         with self._lock:
-            self._send(_SAFE)
             self._problem = None
             self._release()
             until_s = time.monotonic() + _END_S
@@ -104,49 +100,39 @@ class Sentinel:
 
     # ---- under the lock
 
+    @contextlib.contextmanager
+    def _open(self) -> Iterator[socket.socket | None]:
+        """The socket, under the lock; None: there is no process. After an error there is none either."""
+        with self._lock:
+            try:
+                yield self._socket
+            except OSError as error:
+                self._release()
+                self._report(str(error))
+
     def _start(self) -> None:
-        self._sent, self._count, self._awaited, self._problem = b"", 0, 0, ""
+        self._sent, self._awaited, self._subscribers, self._problem = [], 0, 0, ""
         own, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        own.settimeout(0.0)  # a send to a process that hangs fails
+        self._socket = own
+        peer = os.getpid()
         priority = self._runtime.model.sender.priority + _ABOVE_SENDER
-        words = (str(priority), self._node.get_namespace(), f"{self._node.get_name()}_{_PROGRAM}")
-        pidfd = os.pidfd_open(os.getpid())
-        status = os.open("/proc/self/status", os.O_RDONLY)
-        try:
+        node = (self._node.get_namespace(), f"{self._node.get_name()}_{_PROGRAM}")
+        with theirs:
             self._process = start_native_program(
                 native_program(_PROGRAM),
-                (theirs.fileno(), pidfd, status),
-                words,
+                (theirs.fileno(),),
+                (str(peer), f"/proc/{peer}/status", str(priority), *node),
                 environment=os.environ | without_shared_memory() | _libraries(),
             )
-        except OSError:
-            own.close()
-            raise
-        finally:
-            theirs.close()
-            os.close(pidfd)
-            os.close(status)
-        self._socket = own
 
     def _follow(self) -> None:
-        if self._socket is None:
-            return
-        outputs = self._outputs()
-        packed = b"".join(outputs)
-        if packed == self._sent:
-            return
-        file = os.memfd_create("outputs")
-        try:
-            os.write(file, packed)
-            socket.send_fds(self._socket, [_OUTPUTS], [file])
-        except OSError as error:
-            self._fail(str(error.strerror))
-            return
-        finally:
-            os.close(file)
-        self._sent, self._count = packed, len(outputs)
-        self._awaited += 1
+        if self._socket is not None and (outputs := self._outputs()) != self._sent:
+            self._socket.send(_OUTPUTS + b"".join(outputs))
+            self._sent = outputs
+            self._awaited += 1
 
-    def _outputs(self) -> Sequence[bytes]:
+    def _outputs(self) -> list[bytes]:
         """What a stop writes of what is published now."""
         messages = {
             (port.resource, port.type): port.stop_message
@@ -172,43 +158,26 @@ class Sentinel:
                 found.append(figures + b"".join(struct.pack("<I", len(text)) + text for text in texts))
         return found
 
-    def _send(self, order: bytes) -> None:
-        if self._socket is not None:
-            try:
-                self._socket.send(order)
-            except OSError as error:
-                self._fail(str(error.strerror))
-
-    def _take_answers(self, *, wait_s: float) -> None:
-        while self._socket is not None:
-            self._socket.settimeout(wait_s)
-            try:
-                answer = self._socket.recv(_ANSWER_BYTES)
-            except (TimeoutError, BlockingIOError):
-                return
-            except OSError as error:
-                self._fail(str(error.strerror))
-                return
-            finally:
-                if self._socket is not None:
-                    self._socket.settimeout(None)
-            if not answer:
-                self._fail("it has ended")
-                return
-            self._awaited = max(self._awaited - 1, 0)
-            if answer == _READY:
-                self._problem = ""
-            else:
-                self._report(one_line(answer.decode("utf-8", "replace")))
-            wait_s = 0.0
-
-    def _fail(self, why: str) -> None:
-        """It is gone: say so once, and go on without."""
-        self._release()
-        self._report(self._problem or why)
+    def _take_answer(self, its_socket: socket.socket, *, wait_s: float) -> bool:
+        """Whether there was one."""
+        its_socket.settimeout(wait_s)
+        try:
+            answer = its_socket.recv(_ANSWER_BYTES)
+        except (TimeoutError, BlockingIOError):
+            return False
+        finally:
+            its_socket.settimeout(0.0)
+        if not answer:
+            raise ConnectionError("it has ended")
+        if answer.isdigit():
+            self._subscribers = int(answer)
+            return True
+        self._awaited -= 1
+        self._report("" if answer == _READY else one_line(answer.decode("utf-8", "replace")))
+        return True
 
     def _report(self, problem: str) -> None:
-        if problem != self._problem:
+        if problem and problem != self._problem:
             self._node.get_logger().error(
                 f"sentinel: {problem}: a crash of native code leaves drivers with the last outputs"
             )
