@@ -29,6 +29,7 @@
 #include <cstring>
 #include <memory>
 #include <span>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -49,41 +50,13 @@ namespace {
 /// The first byte of each message on the socket.
 enum class Order : char { outputs = 'o', unsafe = 'u', safe = 's' };
 
-constexpr std::size_t kLargestOrder = std::size_t{1} << 20U;  // the system sends less at once
+constexpr std::size_t kLargestOrder = std::size_t{1} << 20U;  // bytes; the system sends less at once
 // The pidfd reports the end after the core dump, which can take seconds, and after memory is released: the status is earlier.
 constexpr int kReadStatusMs = 10;
 // A network loses messages for some ms; a listener and this process may be about to discover each other; and a thread of the
 // executor can still be sending its last message.
 constexpr int kCopies = 20;
 constexpr time_ns_t kCopyEvery = ms_to_ns(10);
-
-/// Reads what sentinel.py packs.
-class Unpacked {
- public:
-  explicit Unpacked(std::span<const char> bytes) : rest_(bytes) {}
-  bool is_empty() const noexcept { return rest_.empty(); }
-  template <typename Number>
-  Number number() {
-    Number read{};
-    std::memcpy(&read, take(sizeof(read)).data(), sizeof(read));
-    return read;
-  }
-  std::string text() {
-    const std::span<const char> read = take(number<std::uint32_t>());
-    return {read.data(), read.size()};
-  }
-
- private:
-  /// Throws Error (invalid_argument) when it is not there.
-  std::span<const char> take(std::size_t length) {
-    if (length > rest_.size()) throw Error(ErrorCode::invalid_argument, "the list of outputs ends too early");
-    const std::span<const char> taken = rest_.first(length);
-    rest_ = rest_.subspan(length);
-    return taken;
-  }
-
-  std::span<const char> rest_;
-};
 
 rmw_time_t duration(std::int64_t ns) {
   return {.sec = static_cast<std::uint64_t>(ns / s_to_ns(1)),
@@ -92,12 +65,6 @@ rmw_time_t duration(std::int64_t ns) {
 
 /// An output to be made safe.
 struct OutputSettings {
-  explicit OutputSettings(Unpacked& list) {
-    for (std::int64_t& each : qos) each = list.number<std::int64_t>();
-    topic = list.text();
-    type = list.text();
-    message = list.text();
-  }
   bool operator==(const OutputSettings&) const = default;
 
   rmw_qos_profile_t profile() const {
@@ -119,6 +86,16 @@ struct OutputSettings {
   std::string type;
   std::string message;
 };
+
+/// One of the list that sentinel.py makes: numbers and words, a space after each, then the message.
+std::istream& operator>>(std::istream& list, OutputSettings& output) {
+  for (std::int64_t& each : output.qos) list >> each;
+  std::streamsize length = 0;
+  list >> output.topic >> output.type >> length;
+  list.ignore();
+  output.message.resize(static_cast<std::size_t>(length));
+  return list.read(output.message.data(), length);
+}
 
 /// A publisher, and the message that makes its output safe.
 class SafeOutput {
@@ -178,12 +155,12 @@ class Outputs {
   Outputs& operator=(const Outputs&) = delete;
 
   /// These from now on; a publisher of the same settings stays. Returns why some are missing; empty: none is.
-  std::string replace(Unpacked list) {
+  std::string replace(std::istringstream list) {
     std::string missing;
     std::vector<std::unique_ptr<SafeOutput>> fresh;
-    while (!list.is_empty()) {
+    for (OutputSettings output; list >> output;) {
       try {
-        fresh.push_back(find_or_make(OutputSettings(list)));
+        fresh.push_back(find_or_make(output));
       } catch (const Error& error) {
         missing += (missing.empty() ? "" : "; ") + std::string(error.what());
       }
@@ -206,11 +183,11 @@ class Outputs {
   }
 
  private:
-  std::unique_ptr<SafeOutput> find_or_make(OutputSettings settings) {
+  std::unique_ptr<SafeOutput> find_or_make(const OutputSettings& settings) {
     for (auto& output : all_) {
       if (output != nullptr && output->settings() == settings) return std::move(output);
     }
-    return std::make_unique<SafeOutput>(node_, std::move(settings));
+    return std::make_unique<SafeOutput>(node_, settings);
   }
 
   rcl_context_t context_{rcl_get_zero_initialized_context()};
@@ -250,11 +227,11 @@ class Peer {
     return is_killed || std::strstr(text.data(), "\nCoreDumping:\t1") != nullptr ||
            std::strstr(text.data(), "\nVmSize:") == nullptr;
   }
-  /// The next order, which stays until another is received; empty: none is there now.
-  std::span<const char> receive() {
+  /// The next order; empty: none is there now.
+  std::string receive() {
     const ssize_t length = recv(socket_, order_.data(), order_.size(), MSG_DONTWAIT);
     is_closed_ = length == 0 || (length < 0 && errno != EAGAIN && errno != EINTR);
-    return std::span(order_).first(static_cast<std::size_t>(std::max(length, ssize_t{0})));
+    return {order_.data(), static_cast<std::size_t>(std::max(length, ssize_t{0}))};
   }
   void answer(const std::string& text) const {
     static_cast<void>(send(socket_, text.data(), text.size(), MSG_NOSIGNAL | MSG_DONTWAIT));
@@ -275,11 +252,11 @@ bool watch(Peer& peer, Outputs& outputs) {
   for (bool is_safe = true;;) {
     peer.wait(is_safe ? -1 : kReadStatusMs);
     const bool is_gone = peer.has_ended() || (!is_safe && peer.is_ending());
-    for (auto order = peer.receive(); !order.empty(); order = peer.receive()) {
+    for (std::string order; !(order = peer.receive()).empty();) {
       if (static_cast<Order>(order[0]) != Order::outputs) {
         is_safe = static_cast<Order>(order[0]) == Order::safe;
       } else if (!is_gone) {  // else listeners would not discover them in time
-        const std::string problem = outputs.replace(Unpacked(order.subspan(1)));
+        const std::string problem = outputs.replace(std::istringstream(order.substr(1)));
         peer.answer(problem.empty() ? "ready" : problem);
       }
     }

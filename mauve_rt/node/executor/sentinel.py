@@ -7,7 +7,6 @@ between activation and a stop that they are not safe.
 import contextlib
 import os
 import socket
-import struct
 import threading
 import time
 from collections.abc import Iterator
@@ -145,17 +144,18 @@ class Sentinel:
             message = messages.get((bound.resource, bound.type_name))
             if message is not None:
                 qos = bound.profile
-                figures = struct.pack(
-                    "<6q",
-                    qos.reliability,
-                    qos.durability,
+                words = (
+                    int(qos.reliability),
+                    int(qos.durability),
                     qos.deadline.nanoseconds,
                     qos.lifespan.nanoseconds,
-                    qos.liveliness,
+                    int(qos.liveliness),
                     qos.liveliness_lease_duration.nanoseconds,
+                    bound.topic,
+                    bound.type_name,
+                    len(message),
                 )
-                texts = (bound.topic.encode(), bound.type_name.encode(), message)
-                found.append(figures + b"".join(struct.pack("<I", len(text)) + text for text in texts))
+                found.append("".join(f"{word} " for word in words).encode() + message)
         return found
 
     def _take_answer(self, its_socket: socket.socket, *, wait_s: float) -> bool:

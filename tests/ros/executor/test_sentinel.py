@@ -6,7 +6,6 @@ import os
 import random
 import signal
 import socket
-import struct
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -296,9 +295,10 @@ def alone(tmp_path: Path, domain: int) -> Iterator[Path]:
             (str(os.getpid()), str(status), "1", "/robot_1", "alone"),
             environment=os.environ | {"ROS_DOMAIN_ID": str(domain)},
         )
-    qos = struct.pack("<6q", ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE, 0, 0, 0, 0)
-    texts = (COUNT.encode(), b"std_msgs/msg/Float64", bytes(serialize_message(Float64())))
-    own.send(b"o" + qos + b"".join(struct.pack("<I", len(text)) + text for text in texts))
+    message = bytes(serialize_message(Float64()))
+    reliable, volatile = int(ReliabilityPolicy.RELIABLE), int(DurabilityPolicy.VOLATILE)
+    words = f"o{reliable} {volatile} 0 0 0 0 {COUNT} std_msgs/msg/Float64 {len(message)} "
+    own.send(words.encode() + message)
     assert own.recv(100) == b"ready"
     own.send(b"u")
     yield status
