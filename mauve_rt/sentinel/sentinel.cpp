@@ -23,7 +23,6 @@
 #include <array>
 #include <cerrno>
 #include <climits>
-#include <csignal>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -221,9 +220,9 @@ class Peer {
     if (pread(status_, text.data(), text.size() - 1, 0) <= 0) return false;  // the pidfd shows the end
     constexpr const char* kPending = "\nSigPnd:\t";
     const char* const pending = std::strstr(text.data(), kPending);
+    constexpr std::uint64_t kKill = 0x100;  // SIGKILL is 9, and 1 is the lowest bit
     const bool is_killed =
-        pending != nullptr &&
-        (std::strtoull(pending + std::strlen(kPending), nullptr, 16) & (1ULL << (SIGKILL - 1))) != 0;
+        pending != nullptr && (std::strtoull(pending + std::strlen(kPending), nullptr, 16) & kKill) != 0;
     return is_killed || std::strstr(text.data(), "\nCoreDumping:\t1") != nullptr ||
            std::strstr(text.data(), "\nVmSize:") == nullptr;
   }
