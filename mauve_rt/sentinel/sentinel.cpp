@@ -56,6 +56,7 @@ constexpr int kReadStatusMs = 10;
 // executor can still be sending its last message.
 constexpr int kCopies = 20;
 constexpr time_ns_t kCopyEvery = ms_to_ns(10);
+constexpr unsigned kLeaveS = 1;  // how long the middleware may take to leave the network
 
 rmw_time_t duration(std::int64_t ns) {
   return {.sec = static_cast<std::uint64_t>(ns / s_to_ns(1)),
@@ -278,6 +279,14 @@ void become_real_time(int priority) {
   static_cast<void>(pthread_setschedparam(pthread_self(), SCHED_FIFO, &urgency));
 }
 
+/// Ends this process soon, in order or by SIGALRM: where a participant is destroyed while it discovers another, Fast DDS can spin
+/// for ever.
+void limit_end() {
+  const sched_param ordinary{};
+  static_cast<void>(pthread_setschedparam(pthread_self(), SCHED_OTHER, &ordinary));
+  alarm(kLeaveS);
+}
+
 int run(std::span<char* const> arguments) {
   if (arguments.size() != 7) return EXIT_FAILURE;
   const int socket = STDERR_FILENO + 1;
@@ -292,6 +301,7 @@ int run(std::span<char* const> arguments) {
           chdir("/"));  // afterwards: the middleware looks for a profile in the executor's folder
       become_real_time(std::stoi(arguments[4]));
       if (watch(peer, outputs)) outputs.publish();
+      limit_end();
       return EXIT_SUCCESS;
     } catch (const std::exception& error) {
       peer.answer(error.what());
