@@ -219,12 +219,13 @@ class Peer {
   bool is_ending() const {
     std::array<char, 4096> text{};
     if (pread(status_, text.data(), text.size() - 1, 0) <= 0) return false;  // the pidfd shows the end
+    if (std::strstr(text.data(), "\nCoreDumping:\t1") != nullptr) return true;
     constexpr const char* kPending = "\nSigPnd:\t";
     const char* const pending = std::strstr(text.data(), kPending);
+    // The next line is there, too: else the text is longer than this buffer, and what is not in it may still follow.
+    if (pending == nullptr || std::strstr(pending, "\nShdPnd:") == nullptr) return false;
     constexpr std::uint64_t kKill = 0x100;  // SIGKILL is 9, and 1 is the lowest bit
-    const bool is_killed =
-        pending != nullptr && (std::strtoull(pending + std::strlen(kPending), nullptr, 16) & kKill) != 0;
-    return is_killed || std::strstr(text.data(), "\nCoreDumping:\t1") != nullptr ||
+    return (std::strtoull(pending + std::strlen(kPending), nullptr, 16) & kKill) != 0 ||
            std::strstr(text.data(), "\nVmSize:") == nullptr;
   }
   /// The next order; empty: none is there now.
@@ -292,13 +293,13 @@ int run(std::span<char* const> arguments) {
   const int socket = STDERR_FILENO + 1;
   try {
     dup2(std::stoi(arguments[1]), socket);
-    close_range(socket + 1, UINT_MAX,
-                0);  // sockets of the executor's middleware: they are to close with the executor
+    // Also the sockets of the executor's middleware: they are to close with the executor.
+    close_range(socket + 1, UINT_MAX, 0);
     Peer peer(socket, std::stoi(arguments[2]), arguments[3]);
     try {
       Outputs outputs(arguments[5], arguments[6]);
-      static_cast<void>(
-          chdir("/"));  // afterwards: the middleware looks for a profile in the executor's folder
+      // Afterwards: the middleware looks for a profile in the executor's folder.
+      static_cast<void>(chdir("/"));
       become_real_time(std::stoi(arguments[4]));
       if (watch(peer, outputs)) outputs.publish();
       limit_end();

@@ -274,7 +274,9 @@ def test_an_executor_has_no_sentinel_of_itself(executor: Any, graph: Any) -> Non
     assert children(executor.process.pid) == {}
 
 
-ALIVE = "Name:\tpython\nVmSize:\t1 kB\nSigPnd:\t0000000000000000\nCoreDumping:\t0\n"
+ALIVE = (
+    "Name:\tpython\nVmSize:\t1 kB\nCoreDumping:\t0\nSigPnd:\t0000000000000000\nShdPnd:\t0000000000000000\n"
+)
 ENDING = {
     "a core dump": ("CoreDumping:\t0", "CoreDumping:\t1"),
     "SIGKILL": ("SigPnd:\t0000000000000000", "SigPnd:\t0000000000000100"),
@@ -311,6 +313,7 @@ def alone(tmp_path: Path, domain: int) -> Iterator[Path]:
 def test_a_crash_shows_before_the_process_has_ended(sign: str, alone: Path, graph: Any) -> None:
     listener = Listener(graph)
     listener.await_publishers(1)
+    alone.write_text(ALIVE.replace("\n", f"\nGroups:\t{'1 ' * 4000}\n", 1), encoding="ascii")
     listener.settle()
     assert listener.heard == []
     alone.write_text(ALIVE.replace(*ENDING[sign]), encoding="ascii")
