@@ -1,4 +1,4 @@
-"""The last message that a listener on another machine gets after a crash of an executor, over a lossy cable."""
+"""The last message that another machine gets after a crash of an executor, over a lossy cable."""
 
 import os
 import signal
