@@ -211,6 +211,11 @@ class WritePort final : public PortBase {
   }
 
  protected:
+  std::vector<std::byte> zero_message() const override {
+    std::vector<std::byte> message;
+    CdrWriter(message).put(zero_);
+    return message;
+  }
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
   }
