@@ -11,7 +11,7 @@ import time
 from pathlib import Path
 
 from mauve_rt.api import Architecture, Deployer, PluginRegistry
-from mauve_rt.trace.bag.disk import keeper_program
+from mauve_rt.native_program import native_program
 from mauve_rt.trace.recording.recorder import Recorder
 
 COMPONENTS, MARKS = 5, 16
@@ -32,7 +32,7 @@ def main(library: str, bag: str, what: str = "records", by: str = "keeper") -> N
         architecture.set_property(name, "marks", MARKS)
     architecture.configure()
     deployer = Deployer(architecture)
-    keeper = keeper_program() if by == "keeper" else None
+    keeper = native_program("bag_keeper") if by == "keeper" else None
     recorder = Recorder(deployer, Path(bag), node_name="/executor", on_error=sys.exit, keeper=keeper)
     recorder.start()
     deployer.deploy()

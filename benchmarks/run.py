@@ -19,6 +19,7 @@ from command import command_rows
 from document import PAGE, figures_of, write_docs
 from echo import echo_rows, watch_rows
 from links import links_rows
+from listeners import last_message_rows
 from micro import (
     activation_rows,
     inversion_rows,
@@ -83,6 +84,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "idle": idle_rows,
     "simulation": simulation_rows,
     "safe-stop": safe_stop_rows,
+    "last-message": last_message_rows,
     "soak": soak_rows,
     "service": service_rows,
     "service-blackout": service_blackout_rows,

@@ -62,7 +62,7 @@ function(mauve_install_python_package package)
     PATTERN "*.py" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json" PATTERN "*.css" PATTERN "*.js"
     PATTERN "*.xml"
     PATTERN "__pycache__" EXCLUDE
-    PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE PATTERN "trace/keeper" EXCLUDE
+    PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE PATTERN "sentinel" EXCLUDE PATTERN "trace/keeper" EXCLUDE
     PATTERN "maps" EXCLUDE PATTERN "architecture" EXCLUDE PATTERN "launch" EXCLUDE PATTERN "tests" EXCLUDE)
   mauve_link_installed("${PROJECT_SOURCE_DIR}/${package}" "${PYTHON_INSTALL_DIR}/${package}")
   # Compiled now: who runs it may have no right to write here, and would compile it at every start.

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from mauve_rt.trace.bag.disk import keeper_program
+from mauve_rt.native_program import native_program
 
-KEEPER = keeper_program()
+KEEPER = native_program("bag_keeper")
 TEXT = "mauve_test_msgs/msg/Text"
 PATIENCE_S = 100.0
 

@@ -74,3 +74,15 @@ def compile_plugin(source: Path, library: Path) -> None:
     compiled = library.with_suffix(".o")
     compile_source(source, compiled)
     link([compiled], library)
+
+
+def install_plugins(prefix: Path, package: str) -> None:
+    """Compile `plugins/PACKAGE.cpp` and list what PACKAGE.txt says, in an ament prefix."""
+    index = prefix / "share" / "ament_index" / "resource_index"
+    (prefix / "lib").mkdir(exist_ok=True)
+    (prefix / "share" / package).mkdir(parents=True)
+    for kind in ("packages", "mauve_rt_plugins"):
+        (index / kind).mkdir(parents=True, exist_ok=True)
+    (index / "packages" / package).touch()
+    shutil.copy(PLUGINS / f"{package}.txt", index / "mauve_rt_plugins" / package)
+    compile_plugin(PLUGINS / f"{package}.cpp", prefix / "lib" / f"lib{package}.so")

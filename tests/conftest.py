@@ -1,13 +1,12 @@
 """What stages share: a small package of plug-ins, compiled once a session."""
 
 import os
-import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from compiled_plugins import PLUGINS, compile_plugin
+from compiled_plugins import PLUGINS, install_plugins
 from rebuilt_package import RebuiltPackage, install_package, search_first
 
 from mauve_rt import _kernel
@@ -15,18 +14,6 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.model.generations import CodeGenerations
 from mauve_rt.model.loaded_code import LoadedCode
 from mauve_rt.model.plugins import PluginLoader
-
-
-def _install_plugins(prefix: Path, package: str) -> None:
-    """Compile `plugins/PACKAGE.cpp` and list what PACKAGE.txt says, in an ament prefix."""
-    index = prefix / "share" / "ament_index" / "resource_index"
-    (prefix / "lib").mkdir(exist_ok=True)
-    (prefix / "share" / package).mkdir(parents=True)
-    for kind in ("packages", "mauve_rt_plugins"):
-        (index / kind).mkdir(parents=True, exist_ok=True)
-    (index / "packages" / package).touch()
-    shutil.copy(PLUGINS / f"{package}.txt", index / "mauve_rt_plugins" / package)
-    compile_plugin(PLUGINS / f"{package}.cpp", prefix / "lib" / f"lib{package}.so")
 
 
 @pytest.fixture(scope="session")
@@ -60,7 +47,7 @@ def rebuilt(tmp_path: Path, builds: Path, monkeypatch: pytest.MonkeyPatch) -> It
 def misfits_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An ament prefix with the package misfits, which is searched only where a test says so."""
     prefix = tmp_path_factory.mktemp("misfits")
-    _install_plugins(prefix, "misfits")
+    install_plugins(prefix, "misfits")
     return prefix
 
 
@@ -68,7 +55,7 @@ def misfits_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def plugin_prefix(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """An ament prefix with the package executor_tests, put in front of those searched."""
     prefix = tmp_path_factory.mktemp("executor_tests")
-    _install_plugins(prefix, "executor_tests")
+    install_plugins(prefix, "executor_tests")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv(
             "AMENT_PREFIX_PATH", os.pathsep.join([str(prefix), os.environ.get("AMENT_PREFIX_PATH", "")])

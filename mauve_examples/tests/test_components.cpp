@@ -91,6 +91,7 @@ class RobotArchitecture {
     done_ = &done;
     goal_ = &goal;
     pose_ = &pose;
+    command_ = &command;
   }
 
   mauve::Architecture& architecture() { return architecture_; }
@@ -113,6 +114,7 @@ class RobotArchitecture {
   }
   bool done() { return value(*done_).data; }
   Pose2D pose() { return value(*pose_); }
+  void command(const Twist& twist, mauve::time_ns_t now_ns) { command_->write.write(twist, now_ns); }
   std::uint64_t goals() {
     Point goal;
     mauve::time_ns_t time_ns = 0;
@@ -147,6 +149,7 @@ class RobotArchitecture {
   SharedData<Bool>* done_{nullptr};
   SharedData<Point>* goal_{nullptr};
   SharedData<Pose2D>* pose_{nullptr};
+  SharedData<Twist>* command_{nullptr};
 };
 
 TEST(Components, PeriodsAreThoseOfTheirMachines) {
@@ -212,6 +215,35 @@ TEST(Components, ReplacingTheRobotsOrTheMappingsCoreLosesNothing) {
   robot.component("robot").swap_core(std::make_unique<RobotCore>());
   EXPECT_GT(distance_m(robot.pose(), robot.start()), 2.0);
   deployer.shutdown();
+  robot.expect_no_faults();
+}
+
+TEST(Components, ARobotStandsStillOnceCommandsNoLongerCome) {
+  RobotArchitecture robot("arena");
+  robot.architecture().configure();
+  mauve::Simulation simulation;
+  mauve::SimulatedHost& host = simulation.add(robot.architecture());
+  simulation.deploy();
+  const auto run_for = [&](mauve::time_ns_t time_ns) { simulation.run_until(simulation.now_ns() + time_ns); };
+  run_for(mauve::ms_to_ns(100));
+  host.stop("control");
+  Twist forward;
+  forward.linear.x = 0.1;
+  const mauve::time_ns_t last_ns = simulation.now_ns() + mauve::s_to_ns(2);
+  simulation.every(simulation.now_ns(), mauve::ms_to_ns(20), [&] {
+    if (simulation.now_ns() <= last_ns) robot.command(forward, simulation.now_ns());
+  });
+  simulation.run_until(last_ns);
+  const Pose2D last = robot.pose();
+  EXPECT_GT(distance_m(last, robot.start()), 0.1);
+  run_for(mauve::ms_to_ns(150));  // the robot waits 200 ms for a command
+  EXPECT_GT(distance_m(robot.pose(), last), 0.01);
+  run_for(mauve::ms_to_ns(350));  // and brakes for 50 ms
+  const Pose2D stopped = robot.pose();
+  run_for(mauve::s_to_ns(1));
+  EXPECT_EQ(distance_m(robot.pose(), stopped), 0.0);
+  EXPECT_LT(distance_m(stopped, last), 0.03);
+  simulation.shutdown();
   robot.expect_no_faults();
 }
 

@@ -84,7 +84,8 @@ ComponentDescription describe_component(Component& component) {
                      .type = port.type,
                      .resource = port.resource,
                      .service = port.service,
-                     .longest_hold_ns = port.longest_hold_ns});
+                     .longest_hold_ns = port.longest_hold_ns,
+                     .stop_message = port.stop_message});
   std::vector<PropertyDescription> properties;
   properties.reserve(shown.properties.size());
   for (const ShownProperty& property : shown.properties) properties.push_back(describe_property(property));
@@ -175,7 +176,14 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("longest_hold_ns", &PortDescription::longest_hold_ns,
                     "For how long a user holds its resource's lock; 0: not declared.")
       .def_readonly("wait_free", &PortDescription::wait_free,
-                    "It takes no lock, as ports are connected now; told of a component's ports.");
+                    "It takes no lock, as ports are connected now; told of a component's ports.")
+      .def_property_readonly(
+          "stop_message",
+          [](const PortDescription& self) {
+            return py::bytes(reinterpret_cast<const char*>(self.stop_message.data()),
+                             self.stop_message.size());
+          },
+          "What a stop writes, as a message; empty: nothing. Told of a component's connected ports.");
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
       .def_readonly("type", &PropertyDescription::type, "'bool', 'int', 'float', 'str'.")

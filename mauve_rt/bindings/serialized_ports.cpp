@@ -64,6 +64,7 @@ class SerializedWritePort final : public PortBase {
   }
 
  protected:
+  std::vector<std::byte> zero_message() const override { return zero_; }
   bool fits(const ServiceBase& service) const noexcept override {
     return dynamic_cast<const SerializedWriteService*>(&service) != nullptr;
   }

@@ -95,7 +95,8 @@ struct PortDescription {
   bool required{true};
   std::vector<MessageShape> messages{};  // of a shell's; a component's tells none
   time_ns_t longest_hold_ns{0};
-  bool wait_free{false};  // takes no lock, as ports are connected now; of a component's
+  bool wait_free{false};                  // takes no lock, as ports are connected now; of a component's
+  std::vector<std::byte> stop_message{};  // of a component's
 };
 std::vector<PortDescription> describe_ports(const Shell& shell);
 

@@ -36,6 +36,7 @@ class ArchitectureModel:
         self.require_realtime = content.executor.require_realtime
         self.diagnostics = content.executor.diagnostics
         self.sender = content.executor.sender
+        self.sentinel = content.executor.sentinel
         self.mirrors = list(content.executor.mirror)
         self.recorded = list(content.executor.record)
         self.components: dict[str, ComponentModel] = dict(content.components)

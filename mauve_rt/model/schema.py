@@ -186,6 +186,11 @@ class ExecutorModel(Section):
     sender: SenderModel = setting(
         Part(SenderModel), "the thread that sends the messages of bound topics", default=SenderModel()
     )
+    sentinel: bool = setting(
+        Flag(),
+        "start a process that publishes the outputs of a stop when a crash of native code ends the executor",
+        default=False,
+    )
     record: list[str] = setting(
         ListOf(_VALUE_NAME),
         "values that are recorded whenever the executor records: resources, or component.port",

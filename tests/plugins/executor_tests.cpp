@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A small package of plug-ins for the executor's tests: a component that counts, in every temper.
 #include <fcntl.h>
+#include <sys/mman.h>
 #include <unistd.h>
 
+#include <array>
 #include <chrono>
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <memory>
@@ -165,6 +168,19 @@ struct CounterShell : mauve::Shell {
   mauve::WritePort<Number>& count = write_port<Number>("count").optional();
 };
 
+/// Ends the process. A fault of the processor: threads of components block signals that are sent.
+inline void write_where_nothing_may() {
+  void* const forbidden = mmap(nullptr, 1, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  *static_cast<volatile char*>(forbidden) = 1;
+}
+
+/// Ends the process: every call takes room of the stack, and needs it after the next one.
+[[gnu::noinline]] inline std::size_t overflow_stack(std::size_t depth) {
+  std::array<char, 4096> room{};
+  asm volatile("" : : "r"(room.data()) : "memory");  // it is used, and may be changed
+  return depth == 0 ? 0 : overflow_stack(depth + 1) + static_cast<std::size_t>(room[depth % room.size()]);
+}
+
 struct Counter : mauve::Core<CounterShell> {
   double count = 0.0;
 
@@ -172,6 +188,9 @@ struct Counter : mauve::Core<CounterShell> {
     if (const auto sample = shell().set.read(); sample.is_new()) {
       if (sample.value.data == -2e8) throw 42;
       if (sample.value.data == -2e7) throw std::runtime_error("bytes \xff\xfe, no text");
+      if (sample.value.data == -3e8) write_where_nothing_may();
+      if (sample.value.data == -4e8) std::abort();
+      if (sample.value.data == -5e8) overflow_stack(1);
       if (sample.value.data < -1e6) throw std::runtime_error("set to something unheard of");
       count = sample.value.data;
     }

@@ -33,6 +33,12 @@ BAD = {
         "prioritty: 40",
         "unknown key 'prioritty' of component 'source'; did you mean",
     ),
+    "sentinel": (
+        "peers: [robot_2, robot_3]",
+        "sentinel: often",
+        "often",
+        "bad sentinel",
+    ),
     "executor key": (
         "peers:",
         "peer:",

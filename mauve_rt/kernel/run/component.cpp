@@ -166,7 +166,8 @@ void Component::show() {
     const ServiceBase* service = port->service();
     now.ports.push_back({port->name(), port->kind(), port->type(), port->resource_name(),
                          service == nullptr ? "" : service->name(),
-                         service == nullptr ? 0 : service->longest_hold_ns()});
+                         service == nullptr ? 0 : service->longest_hold_ns(),
+                         service == nullptr ? std::vector<std::byte>{} : port->stop_message()});
   }
   for (const auto& property : parts_.shell->properties())
     now.properties.push_back({property->name(), property->boxed(), property->options()});

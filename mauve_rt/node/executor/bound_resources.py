@@ -19,7 +19,7 @@ from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
 from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
-from mauve_rt.trace.bag.recorded import SentMessage, TopicQos
+from mauve_rt.trace.bag.recorded import SentMessage
 
 MAX_MIRRORS = 64
 _MIRROR_DEPTH = 10
@@ -27,16 +27,18 @@ _SIDES = {"publish": "publishes", "subscribe": "subscribes"}  # fields of Resour
 
 
 @dataclass(frozen=True)
-class _BoundTopic:
+class BoundTopic:
+    """A resource's topic, or a mirror of it; the topic's name is expanded and remapped."""
+
     resource: str
     direction: str
     topic: str
     type_name: str
-    qos: TopicQos
+    profile: QoSProfile
 
     def message(self, time_ns: int, data: bytes) -> SentMessage:
         """A message on it."""
-        return SentMessage(self.topic, self.type_name, data, time_ns, self.qos)
+        return SentMessage(self.topic, self.type_name, data, time_ns, recorded_qos(self.profile))
 
 
 class Mirrored(NamedTuple):
@@ -70,7 +72,7 @@ class BoundResources:
         self._lock = threading.RLock()
         self._bridge: Bridge | None = None
         self._numbers: dict[str, list[int]] = {}  # of what is open, by resource
-        self._topics: dict[int, _BoundTopic] = {}  # by their numbers in the bridge, also of those closed
+        self._topics: dict[int, BoundTopic] = {}  # by their numbers in the bridge, also of those closed
         self._mirrors: dict[int, Mirrored] = {}  # of those that are open
 
     def configure(self, model: ArchitectureModel, architecture: Architecture) -> None:
@@ -129,9 +131,7 @@ class BoundResources:
         qos = qos_profile(topic.offered_qos, capacity=resource.parameters.get("capacity", 0))
         bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
         number = bind(name, topic.name, resource.topic_type, native_qos(qos))
-        self._topics[number] = _BoundTopic(
-            name, topic.direction, full_name, resource.topic_type, recorded_qos(qos)
-        )
+        self._topics[number] = BoundTopic(name, topic.direction, full_name, resource.topic_type, qos)
         return number
 
     def attach(self, opened: Mapping[str, list[int]]) -> None:
@@ -222,9 +222,7 @@ class BoundResources:
                 numbers=numbers,
                 number=number,
             )
-            self._topics[number_] = _BoundTopic(
-                wanted.resource, "mirror", wanted.topic, wanted.type, recorded_qos(qos)
-            )
+            self._topics[number_] = BoundTopic(wanted.resource, "mirror", wanted.topic, wanted.type, qos)
             self._mirrors[number_] = wanted
             bridge.attach([number_])
 
@@ -243,7 +241,7 @@ class BoundResources:
         with self._lock:
             return [*self._mirrors.values()]
 
-    def _present(self) -> list[_BoundTopic]:
+    def _present(self) -> list[BoundTopic]:
         """The topics that are open."""
         numbers = {number for numbers in self._numbers.values() for number in numbers} | set(self._mirrors)
         return [bound for number, bound in self._topics.items() if number in numbers]
@@ -270,6 +268,11 @@ class BoundResources:
         """The resource that takes the messages of each topic; of several the last."""
         names = self.bindings()
         return {sides["subscribes"]: name for name, sides in names.items() if "subscribes" in sides}
+
+    def published(self) -> list[BoundTopic]:
+        """The topics on which writes to resources are published."""
+        with self._lock:
+            return [bound for bound in self._present() if bound.direction == "publish"]
 
     def types(self) -> dict[str, str]:
         """The type of each bound topic."""

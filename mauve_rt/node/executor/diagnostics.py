@@ -26,6 +26,7 @@ from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
 from mauve_rt.node.executor.rules import OwnRules
+from mauve_rt.node.executor.sentinel import Sentinel
 from mauve_rt.node.executor.state_folder import StateFolder
 from mauve_rt.node.shared.loopback import udp_backlog
 from mauve_rt.supervision.truth import truth_word
@@ -47,6 +48,7 @@ class Diagnostics:
         rules: OwnRules,
         *,
         folder: StateFolder,
+        sentinel: Sentinel,
     ) -> None:
         self._node = node
         self._runtime = runtime
@@ -54,6 +56,7 @@ class Diagnostics:
         self._recording = recording
         self._rules = rules
         self._folder = folder
+        self._sentinel = sentinel
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -74,6 +77,10 @@ class Diagnostics:
         array.status += [self._rule(facts, held) for facts in self._rules.facts()]
         if (problem := self._folder.problem()) is not None:
             array.status.append(self._restart(problem))
+        if (sentinel := self._sentinel.status()) is not None:
+            message, is_well = sentinel
+            level = DiagnosticStatus.OK if is_well else DiagnosticStatus.ERROR
+            array.status.append(self._status("sentinel", level, message, {}))
         if (recording := self._recording.status()) is not None:
             array.status.append(self._bag(recording))
         if late := self._late():

@@ -27,6 +27,7 @@ from mauve_rt.node.executor.mirrors import Mirrors
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
+from mauve_rt.node.executor.sentinel import Sentinel
 from mauve_rt.node.executor.settings import DEFAULTS, PARAMETERS, rules_folder
 from mauve_rt.node.executor.state import StatePublisher
 from mauve_rt.node.executor.state_folder import StateFolder
@@ -86,6 +87,7 @@ class ExecutorNode(LifecycleNode):
         declare_settings(self, PARAMETERS, settings)
         self._bound = BoundResources(self)
         self._values = Values(runtime)
+        self._sentinel = Sentinel(self, runtime, self._bound)
         self._mirrors = Mirrors(self, self._values, self._bound)
         self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
@@ -102,6 +104,7 @@ class ExecutorNode(LifecycleNode):
             folder=rules_folder(settings),
         )
         self._state.rules = self._rules.names
+        self._state.changed = self._sentinel.follow
         self._folder = StateFolder(
             self, self._rules, folder=settings["state_folder"], forget=settings["forget"]
         )
@@ -123,7 +126,13 @@ class ExecutorNode(LifecycleNode):
 
         query_group = MutuallyExclusiveCallbackGroup()
         self._diagnostics = Diagnostics(
-            self, self._runtime, self._bound, self._recording, self._rules, folder=self._folder
+            self,
+            self._runtime,
+            self._bound,
+            self._recording,
+            self._rules,
+            folder=self._folder,
+            sentinel=self._sentinel,
         )
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
@@ -242,6 +251,7 @@ class ExecutorNode(LifecycleNode):
             self._guard.follow(self._runtime)
         self._properties.follow()
         self._bound.configure(self._runtime.model, self._runtime.architecture)
+        self._sentinel.configure()
         self._mirrors.configure(self._runtime.model.mirrors)
         with self._properties.lock:
             names = ("rules", "bag", "record_topics", "bag_split_s", "bag_split_bytes")
@@ -257,6 +267,7 @@ class ExecutorNode(LifecycleNode):
         self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
 
     def _activate(self) -> None:
+        self._sentinel.arm()  # before a component writes
         with self._starting_or_ending:
             try:
                 self._runtime.activate()
@@ -329,6 +340,7 @@ class ExecutorNode(LifecycleNode):
                 self.get_logger().info("deactivated: outputs are safe, components parked")
             self._state.stop()
             self._bound.stop()
+        self._sentinel.disarm()  # all outputs of the stop are sent
 
     def close(self) -> None:
         """End everything this node holds, in order: components, threads, bag, node.
@@ -345,6 +357,7 @@ class ExecutorNode(LifecycleNode):
                 self._recording.stop()
                 self._rules.close()
                 self._folder.close()
+                self._sentinel.close()
                 self._bound.close()
         finally:
             if self._guard is not None:
@@ -369,6 +382,7 @@ class ExecutorNode(LifecycleNode):
         self._recording.stop()
         self._rules.close()
         self._folder.close()
+        self._sentinel.close()
         self._bound.close()
         if self._guard is not None:
             self._guard.release()
@@ -389,6 +403,7 @@ class ExecutorNode(LifecycleNode):
         if self._node_watch is not None:
             self._node_watch.beat()
         self._rules.beat()
+        self._sentinel.follow()
         self._lost_supervisors.look()
         self._state.look_for_hung()
         if step := self._wall_clock.look():

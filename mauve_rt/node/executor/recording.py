@@ -117,7 +117,7 @@ class Recording:
             TraceError: the folder exists already or cannot be written.
 
         """
-        from mauve_rt.trace.bag.disk import keeper_program  # noqa: PLC0415 - a start without a bag needs none
+        from mauve_rt.native_program import native_program  # noqa: PLC0415 - a start without a bag needs none
         from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415
 
         chosen = tuple(self._choose(topics))
@@ -137,7 +137,7 @@ class Recording:
                 split=split,
                 on_error=self._node.get_logger().error,
                 messages=_Sources(self._bound, RecordedValues(self._runtime, recorded), self._shadows),
-                keeper=keeper_program(),
+                keeper=native_program("bag_keeper"),
             )
             recorder.tell_architecture(self._architecture(self._runtime.observe()))
             recorder.start(discard=self._runtime.active)

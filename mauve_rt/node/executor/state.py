@@ -41,6 +41,7 @@ class StatePublisher:
         self.rules: Callable[[], list[str]] = list  # names of those at work
         self.decided: Callable[[Verdict], None] = lambda _verdict: None  # about a core on probation
         self.completed: Callable[[Request, Outcome], None] = lambda _request, _outcome: None
+        self.changed: Callable[[], None] = lambda: None  # the architecture, or who is in which state
         self.error = ""  # why the last lifecycle transition failed
         self._lock = threading.Lock()
         self._published_revision = -1
@@ -121,6 +122,7 @@ class StatePublisher:
         self._ending.wait(_SETTLED_S)
         self._behind = True
         observed = self.refresh()
+        self.changed()
         for fault in faults.look(observed.components):
             self._node.get_logger().error(f"{fault.message}: {fault.part.fault}")
             if fault.part.fell_back:

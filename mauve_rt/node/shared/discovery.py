@@ -58,6 +58,14 @@ def has_open_profile() -> bool:
     return _is_named(OPEN_PROFILE, OPEN_UDP_PROFILE)
 
 
+def without_shared_memory() -> dict[str, str]:
+    """The variables for a child that uses no shared memory; none where the profile is the user's own."""
+    for with_memory, without in ((PROFILE, UDP_PROFILE), (OPEN_PROFILE, OPEN_UDP_PROFILE)):
+        if _is_named(with_memory):
+            return {PROFILES: str(without)}
+    return {}
+
+
 def _is_named(*own: Path) -> bool:
     path = os.environ.get(PROFILES, "")
     return path != "" and any(_is_same(path, each) for each in own)

@@ -116,7 +116,8 @@ def waiting_transport() -> str:
         return ""
     profile = users_profile()
     if not profile:
-        return "" if is_off() else "the transports of this program are not the project's"
+        remedy = f"; set {RANGE}=SUBNET" if os.environ.get(RANGE) == "LOCALHOST" else ""
+        return "" if is_off() else f"the transports of this program are not the project's{remedy}"
     file = profile.partition("=")[2] or profile
     try:
         text = Path(file).read_text("utf-8", errors="replace")

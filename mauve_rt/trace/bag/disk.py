@@ -2,20 +2,18 @@
 
 import contextlib
 import os
-import signal
 import socket
 import struct
 import time
 from collections.abc import Callable, Sequence
-from importlib.util import find_spec
 from pathlib import Path
+
+from mauve_rt.native_program import start_native_program
 
 _ORDER = struct.Struct("<QQQ")  # offset, length, size: as struct Order of keeper.cpp
 _OUTCOME = struct.Struct("<i")
 _KEEP_SIZE = 2**64 - 1
 _LAST_WRITE_S = 0.5  # how long close() waits for the keeper's end
-# What ends a group of processes must not end the keeper inside of a write: it ends with this process.
-_NO_END = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)
 
 
 class Disk:
@@ -65,7 +63,7 @@ class KeptDisk(Disk):
             self._memory = os.memfd_create("bag")
             self._socket, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             with theirs:
-                self._process = _spawn(program, theirs.fileno(), self._memory)
+                self._process = start_native_program(program, (theirs.fileno(), self._memory))
         except OSError as error:
             self._give_up(f"{program} cannot be started ({error.strerror})")
 
@@ -130,29 +128,3 @@ class KeptDisk(Disk):
         memory, self._memory = self._memory, -1
         if memory >= 0:
             os.close(memory)
-
-
-def keeper_program() -> Path:
-    """Where the keeper is installed: in the prefix that has the native modules."""
-    spec = find_spec("mauve_rt._kernel")
-    native = Path(__file__ if spec is None or spec.origin is None else spec.origin)
-    prefix = native.resolve().parents[4]  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/
-    return prefix / "libexec" / "mauve_rt" / "bag_keeper"
-
-
-def _spawn(program: Path, *descriptors: int) -> int:
-    """Start a process that has these file descriptors, in a session of its own; its id."""
-    quiet = [
-        (os.POSIX_SPAWN_OPEN, number, os.devnull, os.O_RDWR, 0)
-        for number in range(3)
-        if number not in descriptors
-    ]
-    kept = [(os.POSIX_SPAWN_DUP2, number, number) for number in descriptors]
-    return os.posix_spawn(
-        program,
-        [program.name, *map(str, descriptors)],
-        {},
-        file_actions=[*quiet, *kept],
-        setsid=True,
-        setsigmask=_NO_END,
-    )

@@ -77,7 +77,7 @@ class Recorder:
             split: when the bag goes on in a new file; after a minute unless said otherwise.
             on_error: called at most once for each cause, with one line, on the recorder thread.
             messages: asked, on the recorder thread, for messages beside those given to record().
-            keeper: the program that writes the files (`keeper_program`), so that a kill of this process finds
+            keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
 
         Raises:

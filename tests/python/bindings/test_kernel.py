@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from python_parts import ActFsm
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Float64
 
@@ -19,7 +20,7 @@ from mauve_rt._kernel import (
     Transaction,
     monotonic_ns,
 )
-from mauve_rt.api import SharedData
+from mauve_rt.api import Core, SharedData, Shell, write_port
 from mauve_rt.model.plugins import PluginIndex
 from mauve_rt.trace.format.records import RECORD, Kind
 
@@ -369,6 +370,35 @@ def test_a_second_writer_of_a_ring_gives_it_a_lock(architecture: Architecture):
     )
     assert wait_free(architecture, "ring") == {"write"}
     assert wait_free(architecture, "beat") == {"read", "write"}
+
+
+def test_a_port_tells_what_a_stop_writes(architecture: Architecture):
+    zero = bytes(serialize_message(Float64()))
+    first = architecture.components()[0].ports
+    assert [(port.name, port.resource, port.stop_message) for port in first] == [("beat", "beat", zero)]
+    architecture.commit(Transaction().disconnect("metronome", "beat"))
+    assert [port.stop_message for port in architecture.components()[0].ports] == [b""]
+
+
+class Talker(Shell):
+    said = write_port(Float64)
+    kept = write_port(Float64, on_stop="hold")
+
+
+class Silent(Core[Talker]):
+    def act(self) -> None:
+        """Write nothing."""
+
+
+def test_a_port_of_python_tells_it_too():
+    architecture = Architecture(PluginRegistry())
+    for name in ("said", "kept"):
+        architecture.add_resource(name, SharedData(Float64))
+    architecture.add_component("talker", shell=Talker, core=Silent, fsm=ActFsm)
+    for name in ("said", "kept"):
+        architecture.connect("talker", name, name, "write")
+    ports = {port.name: port.stop_message for port in architecture.components()[0].ports}
+    assert ports == {"said": bytes(serialize_message(Float64())), "kept": b""}
 
 
 def test_a_type_that_only_python_knows_has_a_lock():

@@ -117,7 +117,7 @@ def test_structs_of_two_libraries_for_one_message_are_connected(plugin_prefix: P
     """The resource has the struct of the library that was loaded first, the port that of the other one."""
     registry = PluginRegistry()
     loader = PluginLoader(registry, PluginIndex.installed())
-    loader.require("core", "mauve_examples/Metronome")
+    loader.require("core", "mauve_examples/Robot")
     architecture = Architecture(registry)
     architecture.add_resource("place", kind="shared_data", type="geometry_msgs/msg/Point")
     for kind in ("shell", "core", "fsm"):

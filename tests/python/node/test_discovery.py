@@ -120,6 +120,18 @@ def test_transports_of_the_users_own_may_wait(
     assert bool(waiting_transport()) == waits
 
 
+@pytest.mark.parametrize("name", [PEERS, SERVER])
+@pytest.mark.parametrize(("reach_of", "waits"), [("LOCALHOST", True), ("SUBNET", False)])
+def test_with_the_range_localhost_a_send_to_peers_may_wait(
+    name: str, reach_of: str, *, waits: bool, environment: pytest.MonkeyPatch
+) -> None:
+    environment.setenv(RANGE, reach_of)
+    environment.setenv(name, "10.0.0.7")
+    keep_to_this_machine()
+    assert waiting_transport().endswith("; set ROS_AUTOMATIC_DISCOVERY_RANGE=SUBNET") == waits
+    assert bool(waiting_transport()) == waits
+
+
 def test_so_is_one_in_the_current_folder(environment: pytest.MonkeyPatch) -> None:
     Path("DEFAULT_FASTRTPS_PROFILES.xml").touch()
     keep_to_this_machine()

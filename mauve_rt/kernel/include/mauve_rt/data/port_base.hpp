@@ -132,6 +132,10 @@ class PortBase {
   /// The same where the service cannot do without waiting. [rt]
   virtual void write_zero_to(ServiceBase& /*service*/, time_ns_t /*time_ns*/) MAUVE_RT {}
   virtual OutputOptions output() const MAUVE_RT { return {OutputPolicy::hold, OutputPolicy::hold}; }
+  /// What `on_stop` lets a stop write, as a message; empty: nothing. [non-rt]
+  std::vector<std::byte> stop_message() const {
+    return output().on_stop == OutputPolicy::set_zero ? zero_message() : std::vector<std::byte>{};
+  }
   /// After this the port swallows writes and finds nothing to read, until reopened. [rt]
   void close() MAUVE_RT { set_special(kClosed | kLeft, kClosed); }
   void reopen() MAUVE_RT {
@@ -175,6 +179,8 @@ class PortBase {
   virtual bool write_serialized(std::span<const std::byte> /*message*/) { return false; }
 
  protected:
+  /// What write_zero() writes, as a message; empty: nothing. [non-rt]
+  virtual std::vector<std::byte> zero_message() const { return {}; }
   /// Whether a service of equal kind and type name, and with messages that lie in memory as this port's, is of the class that
   /// this port needs. Of data the messages say all.
   virtual bool fits(const ServiceBase& /*service*/) const noexcept { return true; }

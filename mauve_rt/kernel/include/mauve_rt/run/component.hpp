@@ -182,7 +182,8 @@ struct ShownPort {
   std::string type;
   std::string resource;  // empty: not connected
   std::string service;
-  time_ns_t longest_hold_ns{0};  // of the resource's lock; 0: not declared
+  time_ns_t longest_hold_ns{0};           // of the resource's lock; 0: not declared
+  std::vector<std::byte> stop_message{};  // what a stop writes; empty: nothing
   bool operator==(const ShownPort&) const = default;
 };
 struct ShownProperty {
