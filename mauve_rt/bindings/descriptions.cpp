@@ -52,9 +52,13 @@ PropertyDescription describe_property(const ShownProperty& property) {
 }
 
 ResourceDescription describe_resource(const Resource& resource) {
-  ResourceDescription description{
-      resource.name(), resource.kind(), resource.type(), {}, resource.longest_hold_ns(),
-      resource.refused_values(), resource.why_refused_value()};
+  ResourceDescription description{resource.name(),
+                                  resource.kind(),
+                                  resource.type(),
+                                  {},
+                                  resource.longest_hold_ns(),
+                                  resource.refused_values(),
+                                  resource.why_refused_value()};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
                                     service->is_call_serializable(), service->messages(),

@@ -232,19 +232,14 @@ Its actions run on the component's thread under the interpreter's lock.)")
            "kind: 'shell', 'core', 'fsm', 'resource', 'type'.")
       .def("resource_kind", &PluginRegistry::resource_kind, py::arg("name"), py::return_value_policy::copy,
            "Given, or registered.")
-      .def(
-          "value_bytes",
-          [](const PluginRegistry& self, const std::string& type, const py::dict& parameters) {
-            ResourceParameters capacities = parameters_of(parameters);
-            std::erase_if(capacities, [](const auto& each) { return !is_capacity(each.first); });
-            return self.value_bytes(type, capacities);
-          },
-          py::arg("type"), py::arg("parameters") = py::dict(),
-          R"(What a value of a registered data type takes, in bytes, in a resource with such parameters.
+      .def("value_bytes", &PluginRegistry::value_bytes, py::arg("type"),
+           py::arg("capacities") = ResourceParameters{},
+           R"(What a value of a registered data type takes, in bytes; 0 when it is none.
 
-0 when the type is not registered.)")
+`capacities`: of its sequences, as `capacity.markers.points`.)")
       .def("sequences", &PluginRegistry::sequences, py::arg("type"),
-           "The sequences of a registered data type, whose capacities its resources need, as `markers.points`.")
+           "The sequences of a registered data type, whose capacities its resources need, as "
+           "`markers.points`.")
       .def(
           "describe_shell",
           [](const PluginRegistry& self, const std::string& name) {

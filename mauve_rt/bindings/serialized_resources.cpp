@@ -45,7 +45,9 @@ class SerializedResource : public Resource {
     if (sequence == 0) message = options_.zero;
     return sequence != 0;
   }
-  void begin_log(std::size_t bytes) override { log_.open(bytes, mutex_, max_bytes_, [this](Place& place) { place = touched_place(); }); }
+  void begin_log(std::size_t bytes) override {
+    log_.open(bytes, mutex_, max_bytes_, [this](Place& place) { place = touched_place(); });
+  }
   void end_log() override { log_.close(mutex_); }
   bool next_write(Message& message, time_ns_t& time_ns) override {
     return log_.next([&](const Place& written) {

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.control.requests import Code, RefusalError, Request
-from mauve_rt.model.resource_kinds import given_kinds
+from mauve_rt.model.resource_kinds import capacities, given_kinds
 from mauve_rt.model.schema import ComponentModel, ResourceModel
 
 _TRACE_RECORD_BYTES = 48
@@ -69,5 +69,5 @@ def bytes_of_resource(resource: ResourceModel, registry: PluginRegistry) -> int:
     told = {each.name: resource.parameters.get(each.name, each.initial) for each in kind.parameters}
     values = kind.values + sum(int(told[each.name]) for each in kind.parameters if each.counts_values)
     depth = (resource.topic.qos.depth or 0) if resource.topic is not None and values else 0
-    value_bytes = registry.value_bytes(resource.type, resource.parameters)
+    value_bytes = registry.value_bytes(resource.type, capacities(resource.parameters))
     return (value_bytes or int(told.get("max_bytes", 0))) * (values + depth)

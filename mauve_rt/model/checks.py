@@ -15,7 +15,7 @@ from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.kinds import Faults
 from mauve_rt.model.message_shapes import REMEDY, message_definition, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
-from mauve_rt.model.resource_kinds import given_kinds, read_parameters
+from mauve_rt.model.resource_kinds import capacities, given_kinds, read_parameters
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import PropertyValue, ResourceModel
 from mauve_rt.model.schema_errors import fault_problem
@@ -218,7 +218,7 @@ class Checks:
         """Whether each sequence of a resource's type has its capacity."""
         resource = self._model.resources[name]
         try:
-            self._loader.registry.value_bytes(resource.type, resource.parameters)
+            self._loader.registry.value_bytes(resource.type, capacities(resource.parameters))
         except MauveError as error:
             what = f"resource '{name}': {error.statement}, at {error.element}"
             facts = {"expected": error.expected, "found": error.found, "remedy": error.remedy}

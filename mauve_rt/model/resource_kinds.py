@@ -20,6 +20,11 @@ def given_kinds() -> Mapping[str, ResourceKind]:
     return {kind.name: kind for kind in given_resource_kinds()}
 
 
+def capacities(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of the parameters of a resource that are capacities of sequences."""
+    return {name: value for name, value in parameters.items() if name.startswith(f"{_CAPACITY}.")}
+
+
 def has_key(kind: ResourceKind, key: str) -> bool:
     """Whether a resource of the kind has the key in a file: `capacity`, or `service.timeout_ms`."""
     return any(parameter.file_key == key for parameter in kind.parameters)
@@ -35,8 +40,8 @@ def read_parameters(
 ) -> dict[str, Any]:
     """The parameters of a resource at `place` of a file; what is wrong is added to `faults`.
 
-    `others`: the keys that a resource of any kind has. Capacities of sequences are held against the type when the resource
-    is made.
+    `others`: the keys that a resource of any kind has. Capacities of sequences are held against the type when
+    the resource is made.
     """
     known = {each.name: each for each in kind.parameters if each.file_key == each.name}
     read: dict[str, Any] = {}

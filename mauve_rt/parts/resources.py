@@ -172,8 +172,9 @@ class SharedData(DataOfKind[T]):
     """The newest value; services `read` and `write`.
 
     A message type that no loaded library registered is held serialized, up to `max_bytes` (65,536): then
-    components in Python and topics share it, and ports of components in C++ are refused. For a type that a library
-    registered, `capacities` says how many elements each sequence of the message holds: `{"markers.points": 64}`.
+    components in Python and topics share it, and ports of components in C++ are refused. For a type that a
+    library registered, `capacities` says how many elements each sequence of the message holds:
+    `{"markers.points": 64}`.
     """
 
     def __init__(

@@ -416,7 +416,7 @@ struct JointShell : mauve::Shell {
 };
 
 struct JointTurner : mauve::Core<JointShell> {
-  void act() {
+  virtual void act() {
     shell().input.with([&](const JointState& joints) {
       if (shell().input.status() != mauve::DataStatus::new_data) return;
       shell().output.write_with([&](JointState& turned) {
@@ -424,6 +424,19 @@ struct JointTurner : mauve::Core<JointShell> {
         for (double& position : turned.position) position = -position;
       });
     });
+  }
+};
+
+/// Passes each message on by a member of its own.
+struct JointKeeper : JointTurner {
+  JointState kept;
+
+  bool configure_hook() override {
+    kept = shell().input.prototype();
+    return true;
+  }
+  void act() override {
+    if (shell().input.read(kept) == mauve::DataStatus::new_data) shell().output.write(kept);
   }
 };
 
@@ -648,6 +661,7 @@ MAUVE_PLUGINS(registry) {
   const std::string joints = "executor_tests/JointShell";
   registry.shell<JointShell>(joints);
   registry.core<JointTurner>("executor_tests/JointTurner", joints);
+  registry.core<JointKeeper>("executor_tests/JointKeeper", joints);
   registry.fsm<JointFsm>("executor_tests/JointFsm", joints);
   registry.shell<CounterShell>(shell);
   registry.shell<OtherShell>("executor_tests/OtherShell");

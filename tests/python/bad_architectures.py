@@ -326,7 +326,7 @@ BAD = {
         "queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}",
         "queue: {kind: latest_value, type: executor_tests/Owning}",
         "executor_tests/Owning",
-        "expected a trivially copyable type, found one with a copy constructor of its own; use shared_data",
+        "found one with a copy constructor of its own, as one with sequences; use shared_data",
     ),
     "type of an event": (
         "queue: {kind: ring_buffer, type: std_msgs/msg/Float64, capacity: 4}",

@@ -419,7 +419,7 @@ void PluginRegistry::throw_not_of_type(const ResourceKind& kind, const std::stri
     throw Error(ErrorCode::type_mismatch, "the type cannot be copied without a lock",
                 {.element = "type " + type,
                  .expected = "a trivially copyable type",
-                 .found = "one with sequences, or with a copy constructor of its own",
+                 .found = "one with a copy constructor of its own, as one with sequences",
                  .remedy = "use shared_data, or bounded members in the type"});
   }
   if (kind.type == TypeNeed::data) throw_unknown_type(type);

@@ -121,7 +121,8 @@ std::size_t value_bytes(const MessageShape& message, const Capacities& capacitie
 }
 
 std::string overflow_text(const std::string& path, std::size_t capacity, std::size_t size) {
-  const std::string count = size == 0 ? "more elements than its memory holds" : std::to_string(size) + " elements";
+  const std::string count =
+      size == 0 ? "more elements than its memory holds" : std::to_string(size) + " elements";
   return path + " has " + count + ", the resource's capacity is " + std::to_string(capacity) +
          ": write no more, or raise capacity." + path + " of the resource";
 }

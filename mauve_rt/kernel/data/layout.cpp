@@ -21,8 +21,7 @@ std::string words(const FieldShape& field) {
 }
 
 bool is_same(const FieldShape& one, const FieldShape& other) {
-  const bool is_named_so =
-      detail::is_field(one.name, other.name) || detail::is_field(other.name, one.name);
+  const bool is_named_so = detail::is_field(one.name, other.name) || detail::is_field(other.name, one.name);
   return is_named_so && one.type == other.type && one.text_capacity == other.text_capacity &&
          one.arity == other.arity && one.size == other.size && one.offset == other.offset &&
          one.item_bytes == other.item_bytes;
@@ -56,7 +55,8 @@ std::optional<LayoutDifference> difference(const std::vector<FieldShape>& expect
 std::optional<LayoutDifference> layout_difference(const MessageShape& expected, const MessageShape& found) {
   if (auto of_field = difference(expected.fields, found.fields)) return of_field;
   if (expected.bytes == found.bytes) return {};
-  return LayoutDifference{"", std::to_string(expected.bytes) + " bytes", std::to_string(found.bytes) + " bytes"};
+  return LayoutDifference{"", std::to_string(expected.bytes) + " bytes",
+                          std::to_string(found.bytes) + " bytes"};
 }
 
 std::string library_of(const void* polymorphic_object) {

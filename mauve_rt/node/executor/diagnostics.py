@@ -71,7 +71,9 @@ class Diagnostics:
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
-        array.status += [self._refusals(one) for one in self._runtime.described_resources() if one.refused_values]
+        array.status += [
+            self._refusals(one) for one in self._runtime.described_resources() if one.refused_values
+        ]
         array.status += [self._shadow(record) for record in self._runtime.shadows()]
         held = held_elements(self._runtime)
         array.status += [self._rule(facts, held) for facts in self._rules.facts()]

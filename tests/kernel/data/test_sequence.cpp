@@ -2,10 +2,11 @@
 // Sequences whose capacity is given with the resource: nothing is allocated after that, nothing is cut, what is too long is refused.
 #include <thread>
 
-#include "fixtures.hpp"
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
 #include "mauve_rt/data/capacities.hpp"
+
+#include "fixtures.hpp"
 
 namespace mauve::testing::test_sequence {
 
@@ -135,8 +136,9 @@ TEST(Capacities, AreOfThePathsOfTheType) {
   EXPECT_EQ(sizeof(Markers) + 3 * (sizeof(Marker) + 4 * sizeof(types::Point)) + 2 * sizeof(types::Point),
             value_bytes(shape, capacities));
   const auto number = [](std::int64_t value) { return PropertyValue(value); };
-  const ResourceParameters given{
-      {"capacity.markers", number(3)}, {"capacity.markers.points", number(4)}, {"capacity.pair.points", number(1)}};
+  const ResourceParameters given{{"capacity.markers", number(3)},
+                                 {"capacity.markers.points", number(4)},
+                                 {"capacity.pair.points", number(1)}};
   EXPECT_EQ(capacities, capacities_of(shape, given));
   ResourceParameters lacking = given;
   lacking.erase("capacity.markers.points");
@@ -210,7 +212,8 @@ TYPED_TEST(WithSequences, AMemberWithoutMemoryGetsNothingAndIsCounted) {
   Scan without;
   EXPECT_EQ(DataStatus::none, this->reader.read(without));
   EXPECT_EQ(1U, this->resource->refused_values());
-  EXPECT_THAT(this->resource->why_refused_value(), ::testing::HasSubstr("ranges has more elements than its memory"));
+  EXPECT_THAT(this->resource->why_refused_value(),
+              ::testing::HasSubstr("ranges has more elements than its memory"));
 }
 
 TYPED_TEST(WithSequences, MoreThanTheCapacityIsRefusedCountedAndExplained) {
@@ -224,7 +227,8 @@ TYPED_TEST(WithSequences, MoreThanTheCapacityIsRefusedCountedAndExplained) {
   EXPECT_FALSE(this->writer.write(longer));
   EXPECT_EQ(2U, this->resource->refused_values());
   EXPECT_EQ(
-      "ranges has 20 elements, the resource's capacity is 8: write no more, or raise capacity.ranges of the resource",
+      "ranges has 20 elements, the resource's capacity is 8: write no more, or raise capacity.ranges of the "
+      "resource",
       this->resource->why_refused_value());
   EXPECT_EQ(DataStatus::new_data, this->reader.with([](const Scan& scan) { EXPECT_EQ(1, scan.number); }));
   for (int i = 0; i < 20; ++i) {  // no place is lost with a refused value
@@ -384,7 +388,8 @@ void go_on_a_small_stack(Resource& resource) {
     }
   } work{[&] {
     EXPECT_TRUE(writer->write_with([](Picture& picture) { picture.pixels.back() = 9; }));
-    EXPECT_EQ(DataStatus::new_data, reader->with([](const Picture& picture) { EXPECT_EQ(9, picture.pixels.back()); }));
+    EXPECT_EQ(DataStatus::new_data,
+              reader->with([](const Picture& picture) { EXPECT_EQ(9, picture.pixels.back()); }));
     writer->write_zero();
   }};
   pthread_attr_t attributes;
@@ -429,9 +434,11 @@ TEST(Sequences, OfAFileAreGivenWithTheResource) {
   EXPECT_NE(nullptr, registry.make_resource("ring_buffer", name, ring));
   const Error none = error_of([&] { registry.make_resource("shared_data", name, {}); });
   EXPECT_EQ("add capacity: {ranges: N}", none.detail().remedy);
-  EXPECT_EQ(ErrorCode::type_mismatch, error_of([&] { registry.make_resource("latest_value", name, capacity); }).code());
+  EXPECT_EQ(ErrorCode::type_mismatch,
+            error_of([&] { registry.make_resource("latest_value", name, capacity); }).code());
   registry.type<types::Pose>();
-  const Error needless = error_of([&] { registry.make_resource("shared_data", type_name<types::Pose>(), capacity); });
+  const Error needless =
+      error_of([&] { registry.make_resource("shared_data", type_name<types::Pose>(), capacity); });
   EXPECT_EQ("none: each field of geometry_msgs/msg/Pose has its bound", needless.detail().expected);
 }
 

@@ -8,7 +8,7 @@ from geometry_msgs.msg import Point
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 
-from mauve_rt._kernel import Architecture, MauveError, PluginRegistry, Simulation
+from mauve_rt._kernel import Architecture, MauveError, PluginRegistry, Simulation, Transaction
 from mauve_rt.api import LatestValue, RingBuffer, SharedData
 from mauve_rt.cli.main import main
 from mauve_rt.control.limits import bytes_of_resource
@@ -23,8 +23,8 @@ components:
   turner: {{shell: executor_tests/JointShell, core: executor_tests/JointTurner, fsm: executor_tests/JointFsm}}
 resources:
   joints: {{kind: shared_data, type: sensor_msgs/msg/JointState, {CAPACITY}}}
-  turned: {{kind: ring_buffer, capacity: 3, type: sensor_msgs/msg/JointState, capacity.name: 4, capacity.position: 4,
-           capacity.velocity: 4, capacity.effort: 4}}
+  turned: {{kind: ring_buffer, capacity: 3, type: sensor_msgs/msg/JointState,
+           capacity.name: 4, capacity.position: 4, capacity.velocity: 4, capacity.effort: 4}}
 connections:
   - [turner.input, joints.read]
   - [turner.output, turned.write]
@@ -62,13 +62,53 @@ def test_a_core_reads_and_writes_sequences_in_place(tmp_path: Path, plugin_prefi
     assert not host.write_resource("joints", serialize_message(joints(5)))
 
 
+def test_a_new_core_gets_the_memory_of_the_resource_that_it_is_wired_to(
+    tmp_path: Path, plugin_prefix: Path
+) -> None:
+    more = "".join(
+        f"  {name}: {{kind: shared_data, type: {TYPE}, {CAPACITY.replace('4', '9')}}}\n"
+        for name in ("many", "passed")
+    )
+    text = GOOD.replace(
+        "fsm: executor_tests/JointFsm",
+        "fsm: executor_tests/JointFsm, alternatives: [executor_tests/JointKeeper]",
+    )
+    simulation = Simulation()
+    architecture = built(tmp_path, text.replace("connections:", f"{more}connections:"))
+    host = simulation.add(architecture)
+    simulation.deploy()
+    change = Transaction().replace_core("turner", "executor_tests/JointKeeper")
+    for port, resource, service in (("input", "many", "read"), ("output", "passed", "write")):
+        change.disconnect("turner", port).connect("turner", port, resource, service)
+    simulation.at(simulation.now_ns() + 25_000_000, lambda: host.commit(change))
+    simulation.run_until(simulation.now_ns() + 100_000_000)
+    assert host.write_resource("many", serialize_message(joints(9)))
+    simulation.run_until(simulation.now_ns() + 50_000_000)
+    assert deserialize_message(host.read_resource("passed")[0], JointState) == joints(9)
+
+
 BAD = {
-    "none": (f", {CAPACITY}", "", "joints: {", "needs a capacity, at capacity.name: expected how many elements it holds at most, found none; add "),
+    "none": (
+        f", {CAPACITY}",
+        "",
+        "joints: {",
+        "needs a capacity, at capacity.name: expected how many elements it holds at most, found none; add ",
+    ),
     "one lacks": (", effort: 4}", "}", "joints: {", "at capacity.effort"),
-    "unknown": ("effort: 4}", "efort: 4, effort: 4}", "joints: {", "no such sequence, at capacity.efort: expected one of"),
+    "unknown": (
+        "effort: 4}",
+        "efort: 4, effort: 4}",
+        "joints: {",
+        "no such sequence, at capacity.efort: expected one of",
+    ),
     "zero": ("{name: 4", "{name: 0", "0", "expected at least 1, found 0"),
     "no number": ("{name: 4", "{name: many", "many", "expected a whole number, found 'many'"),
-    "latest value": ("joints: {kind: shared_data", "joints: {kind: latest_value", "sensor", "one with sequences"),
+    "latest value": (
+        "joints: {kind: shared_data",
+        "joints: {kind: latest_value",
+        "sensor",
+        "as one with sequences",
+    ),
     "ring without length": ("capacity: 3, ", "", "turned: {", "resource 'turned' has no capacity"),
 }
 
@@ -95,7 +135,7 @@ def test_capacities_of_a_program(plugin_prefix: Path) -> None:
     architecture.add_resource("three", RingBuffer(JointState, 2, capacities=FOUR))
     with pytest.raises(MauveError, match=r"each sequence of sensor_msgs/msg/JointState needs a capacity"):
         architecture.add_resource("four", SharedData(JointState))
-    with pytest.raises(MauveError, match="one with sequences"):
+    with pytest.raises(MauveError, match="as one with sequences"):
         architecture.add_resource("five", LatestValue(JointState))
     assert {resource.name for resource in architecture.resources()} == {"one", "two", "three"}
 
@@ -123,7 +163,9 @@ def test_structs_of_two_libraries_for_one_message_are_connected(plugin_prefix: P
     for kind in ("shell", "core", "fsm"):
         loader.require(kind, "executor_tests/Pilot" + {"core": ""}.get(kind, kind.capitalize()))
     architecture.add_resource("attitude", kind="shared_data", type="executor_tests/Attitude")
-    architecture.add_component("pilot", "executor_tests/PilotShell", "executor_tests/Pilot", "executor_tests/PilotFsm")
+    architecture.add_component(
+        "pilot", "executor_tests/PilotShell", "executor_tests/Pilot", "executor_tests/PilotFsm"
+    )
     architecture.connect("pilot", "attitude", "attitude", "write")
     architecture.connect("pilot", "place", "place", "write")
     architecture.configure()

@@ -343,4 +343,6 @@ def test_sequences_go_from_topic_to_topic_and_what_is_too_long_is_explained(bind
         return bool(bound.report("/robot/joints").refusal)
 
     graph.spin_until(refused, "the refusal")
-    assert bound.report("/robot/joints").refusal.startswith("position has 4 elements, the resource's capacity is 3")
+    assert bound.report("/robot/joints").refusal.startswith(
+        "position has 4 elements, the resource's capacity is 3"
+    )

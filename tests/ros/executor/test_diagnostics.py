@@ -143,7 +143,8 @@ components:
 resources:
   joints: {{kind: shared_data, type: sensor_msgs/msg/JointState, {capacity},
            topic: {{name: joints, direction: subscribe}}}}
-  turned: {{kind: shared_data, type: sensor_msgs/msg/JointState, {capacity.replace("position: 4", "position: 2")}}}
+  turned: {{kind: shared_data, type: sensor_msgs/msg/JointState,
+           {capacity.replace("position: 4", "position: 2")}}}
 connections:
   - [turner.input, joints.read]
   - [turner.output, turned.write]

@@ -169,7 +169,8 @@ class SequenceLimits {
     }
   }
 
-  const Capacities& capacities() const noexcept { return capacities_; }
+  /// [rt]
+  const Capacities& capacities() const MAUVE_RT { return capacities_; }
   /// Memory for a value's sequences. [setup]
   void allocate(T& value) const { detail::allocate(value, capacities_, ""); }
   /// An empty value with memory. [setup]

@@ -167,7 +167,8 @@ class CdrReader {
     [[maybe_unused]] const auto got = [&](auto member) {
       if (get(value.*member)) return ++field != 0;
       if (too_long_ != nullptr && too_long_->size != 0)
-        MAUVE_RT_TRUSTED(too_long_->add(TypeTraits<T>::field_names, field));  // only where an ordinary thread asks
+        MAUVE_RT_TRUSTED(
+            too_long_->add(TypeTraits<T>::field_names, field));  // only where an ordinary thread asks
       return false;
     };
     std::apply([&](auto... member) { (void)(got(member) && ...); }, TypeTraits<T>::fields());

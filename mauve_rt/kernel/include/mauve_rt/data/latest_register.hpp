@@ -188,7 +188,8 @@ class LatestRegister {
   }
   /// One that neither readers nor a borrower use, and that is not the newest; kNone: there is none.
   std::size_t free_slot(const Table& slots) noexcept {
-    const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
+    const std::size_t newest =
+        index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
     MAUVE_AUDIT(newest < slots.size());
     for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
       Slot& slot = *slots[i];
@@ -201,7 +202,8 @@ class LatestRegister {
   }
   /// A free or borrowed slot that was filled becomes the newest.
   void publish(std::size_t i, time_ns_t time_ns, const Table& slots) noexcept {
-    const std::size_t newest = index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
+    const std::size_t newest =
+        index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
     Slot& slot = *slots[i];
     slot.released.store(0, std::memory_order_relaxed);  // relaxed: published with the word
     slot.entry.time_ns = time_ns;

@@ -20,6 +20,9 @@ inline constexpr std::uint32_t kLeftBehind = 2;
 /// topic). Connecting a reader allocates nothing.
 template <Described T>
 class LatestValue final : public NewestValue<T> {
+  static_assert(!kHasSequences<T>,
+                "a latest_value holds values in place: use shared_data for a type with sequences");
+
  public:
   /// Throws Error (out_of_range). [setup]
   explicit LatestValue(std::uint32_t max_readers = kDefaultMaxReaders)

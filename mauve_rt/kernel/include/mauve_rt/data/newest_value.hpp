@@ -70,8 +70,9 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   }
 
  private:
-  static constexpr std::size_t kOthers = 1;        // one at a time, under others_mutex_
-  static constexpr std::size_t kOtherWriters = 2;  // without a port: a topic, and who writes a message by hand
+  static constexpr std::size_t kOthers = 1;  // one at a time, under others_mutex_
+  static constexpr std::size_t kOtherWriters =
+      2;  // without a port: a topic, and who writes a message by hand
 
   class Read final : public ReadService<T> {
    public:

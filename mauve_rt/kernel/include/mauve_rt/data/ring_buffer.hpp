@@ -109,7 +109,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
  private:
   static constexpr std::size_t kCacheLine = 64;
 
-  static constexpr std::size_t kOtherUsers = 2;  // of an end, without a port: a topic, and who looks at messages
+  static constexpr std::size_t kOtherUsers =
+      2;  // of an end, without a port: a topic, and who looks at messages
   using Block = std::conditional_t<kIsLarge<T>, T*, T>;
   using Spares = std::vector<T*>;
 
@@ -227,7 +228,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   void end_loan(const Loan<T>& loan, ReaderState& reader) noexcept {
     if (loan.value == nullptr) return;
     const BiasedMutex::Hold hold(readers_mutex(), reader.seat);
-    MAUVE_RT_TRUSTED(readers_.spares.push_back(const_cast<T*>(loan.value)));  // within its capacity: add_spares()
+    MAUVE_RT_TRUSTED(
+        readers_.spares.push_back(const_cast<T*>(loan.value)));  // within its capacity: add_spares()
   }
   /// The oldest; under the readers' lock.
   void remove(std::uint64_t head) noexcept {
@@ -285,7 +287,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   void add(time_ns_t time_ns) noexcept {
     places_[writers_.place].time_ns = time_ns;
     if (++writers_.place == places_.size()) writers_.place = 0;
-    const std::uint64_t tail = writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
+    const std::uint64_t tail =
+        writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
     writers_.tail.store(tail + 1, std::memory_order_release);
   }
 
@@ -319,7 +322,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   std::vector<Place> places_;
   WhenFull when_full_;
   Mutex room_mutex_;
-  std::vector<std::unique_ptr<T>> blocks_;  // of large elements: those of the places, and spare ones of each end
+  std::vector<std::unique_ptr<T>>
+      blocks_;  // of large elements: those of the places, and spare ones of each end
   alignas(kCacheLine) BiasedMutex readers_mutex_;
 
  public:

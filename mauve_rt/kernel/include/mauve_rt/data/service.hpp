@@ -249,7 +249,9 @@ class WriteService : public ServiceBase {
   /// A place for the writer to fill without a lock, then publish() or give_back(); nullptr: there is none. [rt]
   virtual T* borrow(BiasedMutex::Seat* /*seat*/) MAUVE_RT { return nullptr; }
   /// As write(), of what was borrowed. [rt]
-  virtual bool publish(T& /*place*/, time_ns_t /*time_ns*/, BiasedMutex::Seat* /*seat*/) MAUVE_RT { return false; }
+  virtual bool publish(T& /*place*/, time_ns_t /*time_ns*/, BiasedMutex::Seat* /*seat*/) MAUVE_RT {
+    return false;
+  }
   virtual void give_back(T& /*place*/, BiasedMutex::Seat* /*seat*/) MAUVE_RT {}
   /// A value with memory for whatever the service takes. [setup]
   virtual std::unique_ptr<T> make() const { return std::make_unique<T>(); }
