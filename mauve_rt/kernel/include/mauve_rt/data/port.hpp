@@ -302,17 +302,11 @@ class WritePort final : public PortBase {
   }
 
  protected:
-<<<<<<< HEAD
-=======
   std::vector<std::byte> zero_message() const override {
     std::vector<std::byte> message;
     CdrWriter(message).put(zero_);
     return message;
   }
-  bool fits(const ServiceBase& service) const noexcept override {
-    return dynamic_cast<const WriteService<T>*>(&service) != nullptr;
-  }
->>>>>>> main
   void attach(ServiceBase* service, BiasedMutex::Seat* seat) noexcept override {
     service_ = static_cast<WriteService<T>*>(service);
     seat_ = seat;
