@@ -61,6 +61,11 @@ class CdrWriter {
   void put(const BoundedString<N>& value) {
     put_string(value.view());
   }
+  template <std::size_t N>
+  void put(const BoundedWString<N>& value) {
+    put(static_cast<std::uint32_t>(value.view().size()));
+    for (const char16_t unit : value.view()) put(std::uint32_t{unit});  // 4 bytes each, as rmw_fastrtps has it
+  }
   void put(const std::string& value) { put_string(value); }
   template <typename T, std::size_t N>
   void put(const std::array<T, N>& value) {
@@ -146,6 +151,15 @@ class CdrReader {
     if (from == nullptr) return false;
     const std::size_t length = size == 0 ? 0 : size - 1;  // the terminating zero is on the wire
     return ok_ = value.assign({reinterpret_cast<const char*>(from), length});
+  }
+  template <std::size_t N>
+  bool get(BoundedWString<N>& value) MAUVE_RT {
+    std::uint32_t size = 0;
+    if (!get(size)) return false;
+    value.assign({});
+    std::uint32_t unit = 0;
+    while (size-- > 0 && get(unit)) ok_ = unit <= 0xFFFF && value.push_back(static_cast<char16_t>(unit));
+    return ok_;
   }
   template <typename T, std::size_t N>
   bool get(std::array<T, N>& value) MAUVE_RT {
