@@ -1,7 +1,9 @@
-"""Each message and service of the common packages through its generated C++ struct: equal values and bytes."""
+"""Each message and service of the common packages through its generated C++ struct and back."""
 
 import ctypes
 import fcntl
+import json
+import os
 import re
 import subprocess
 import sys
@@ -11,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from ament_index_python.packages import get_package_share_path
 from compiled_plugins import BUILD, INSTALLED, PLUGINS, compile_source, link
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -32,6 +33,7 @@ PACKAGES = [
     "lifecycle_msgs",
     "std_srvs",
 ]
+ROS = [Path(path) for path in os.environ["AMENT_PREFIX_PATH"].split(os.pathsep) if path]
 GENERATOR = INSTALLED / "share" / "mauve_rt" / "cmake" / "mauve_generate_types.py"
 ERRORS = ("-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror")
 CAPACITY = 2  # elements of each sequence without a bound
@@ -45,7 +47,7 @@ RoundTrip = Callable[[str, bytes], bytes | None]
 
 def type_names() -> Iterator[str]:
     for package in PACKAGES:
-        share = get_package_share_path(package)
+        share = next(share for prefix in ROS if (share := prefix / "share" / package).is_dir())
         yield from (f"{package}/msg/{path.stem}" for path in sorted(share.glob("msg/*.idl")))
         for path in sorted(share.glob("srv/*.idl")):
             yield from (f"{package}/srv/{path.stem}_{part}" for part in ("Request", "Response"))
@@ -65,18 +67,9 @@ def message_class(name: str) -> Any:
 def compile_round_trips(folder: Path) -> Path:
     """A library with all structs, of two units; only what has changed is compiled."""
     include = folder / "include"
-    words = [
-        "--target",
-        "all",
-        "--output",
-        include,
-        "--prefixes",
-        *map(str, {p.parent.parent for p in map(get_package_share_path, PACKAGES)}),
-    ]
-    subprocess.run(
-        [sys.executable, GENERATOR, *words, "--interfaces", *PACKAGES], check=True, stdout=subprocess.DEVNULL
-    )
-    headers = sorted(include.rglob("*.hpp"))
+    words = ["--target", "all", "--output", include, "--prefixes", *ROS, "--interfaces", *PACKAGES]
+    subprocess.run([sys.executable, GENERATOR, *words], check=True, stdout=subprocess.DEVNULL)
+    headers = [include / name for name in json.loads((folder / "all.json").read_text("utf-8"))["written"]]
     objects = []
     for number, some in enumerate((headers[::2], headers[1::2])):
         structs = [
@@ -85,16 +78,15 @@ def compile_round_trips(folder: Path) -> Path:
             for struct in re.findall(r"^MAUVE_TYPE\(([\w:]+)", header.read_text("utf-8"), re.MULTILINE)
         ]
         unit = folder / f"unit_{number}.cpp"
-        text = "".join(
-            [
-                '#include "round_trip.hpp"\n',
-                *(f"#include <{header.relative_to(include)}>\n" for header in some),
-                "extern const bool kAdded[];\nconst bool kAdded[]{\n".replace("kAdded", f"kAdded{number}"),
-                *(f"    round_trip::add<{struct}>(),\n" for struct in structs),
-                "};\n",
-            ]
-        )
-        unit.write_text(text, encoding="utf-8")
+        lines = [
+            '#include "round_trip.hpp"',
+            *(f"#include <{header.relative_to(include)}>" for header in some),
+            f"extern const bool kAdded{number}[];",
+            f"const bool kAdded{number}[]{{",
+            *(f"    round_trip::add<{struct}>()," for struct in structs),
+            "};",
+        ]
+        unit.write_text("\n".join(lines) + "\n", encoding="utf-8")
         objects.append(folder / f"unit_{number}.o")
         compile_source(unit, objects[-1], f"-I{include}", f"-I{PLUGINS}", *ERRORS)
     objects.append(folder / "round_trip.o")
@@ -131,30 +123,36 @@ def round_trip() -> RoundTrip:
     return go
 
 
-# ---- random messages --------------------------------------------------------------------------------------------------
+# ---- random messages ----
 
 
 def values(field: Any) -> st.SearchStrategy[Any]:
     """Of a field's type."""
-    if isinstance(field, idl.Array):
-        return st.lists(values(field.value_type), min_size=field.size, max_size=field.size)
-    if isinstance(field, idl.AbstractSequence):
-        most = field.maximum_size if field.has_maximum_size() else CAPACITY
-        return st.lists(values(field.value_type), max_size=most)
+    if isinstance(field, idl.AbstractNestedType):
+        least, most = (
+            (field.size, field.size) if isinstance(field, idl.Array) else (0, bound(field, CAPACITY))
+        )
+        return st.lists(values(field.value_type), min_size=least, max_size=most)
     if isinstance(field, idl.AbstractString):
         text = st.text(st.characters(exclude_categories=["Cs"], exclude_characters="\0"), max_size=4)
-        return text | st.just("m" * (field.maximum_size if field.has_maximum_size() else TEXT_CAPACITY))
+        return text | st.just("m" * bound(field, TEXT_CAPACITY))
     if isinstance(field, idl.NamespacedType):
         return messages("/".join(field.namespaced_name()))
-    if field.typename == "boolean":
-        return st.booleans()
-    if field.typename == "octet":
-        return st.binary(min_size=1, max_size=1)
-    bits = 8 * SIZES[field.typename]
-    if field.typename in ("float", "double"):
+    return numbers(field.typename)
+
+
+def bound(field: Any, otherwise: int) -> int:
+    return int(field.maximum_size) if field.has_maximum_size() else otherwise
+
+
+def numbers(typename: str) -> st.SearchStrategy[Any]:
+    bits = 8 * SIZES[typename]
+    if typename in ("float", "double"):
         return st.floats(allow_nan=False, width=bits)
-    unsigned = field.typename.startswith("u")
-    return st.integers(0, 2**bits - 1) if unsigned else st.integers(-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    if typename.startswith("int"):
+        return st.integers(-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    others = {"boolean": st.booleans(), "octet": st.binary(min_size=1, max_size=1)}
+    return others.get(typename, st.integers(0, 2**bits - 1))
 
 
 def messages(name: str) -> st.SearchStrategy[Any]:
@@ -163,7 +161,7 @@ def messages(name: str) -> st.SearchStrategy[Any]:
     return st.builds(definition, **{field: values(slot) for field, slot in fields.items()})
 
 
-# ---- bytes ------------------------------------------------------------------------------------------------------------
+# ---- bytes ----
 
 
 class Layout:
@@ -218,3 +216,36 @@ def test_values_and_bytes_are_equal(name: str, round_trip: RoundTrip) -> None:
         assert layout.without_padding(written) == layout.without_padding(given_bytes[: len(written)])
 
     check()
+
+
+def make_excessive(message: Any) -> bool:
+    """Give the first list or text without a bound one element more than its struct holds."""
+    for field, slot in zip(message.get_fields_and_field_types(), message.SLOT_TYPES, strict=True):
+        if isinstance(slot, idl.UnboundedString):
+            setattr(message, field, "m" * (TEXT_CAPACITY + 1))
+        elif isinstance(slot, idl.UnboundedSequence):
+            item = slot.value_type
+            is_message = isinstance(item, idl.NamespacedType)
+            first = message_class("/".join(item.namespaced_name()))() if is_message else zero(item)
+            setattr(message, field, [first] * (CAPACITY + 1))
+        elif not isinstance(slot, idl.NamespacedType) or not make_excessive(getattr(message, field)):
+            continue
+        return True
+    return False
+
+
+def zero(item: Any) -> Any:
+    if isinstance(item, idl.AbstractString):
+        return ""
+    return {"boolean": False, "octet": b"\0", "float": 0.0, "double": 0.0}.get(item.typename, 0)
+
+
+EXCESSIVE = [name for name in TYPES if make_excessive(message_class(name)())]
+
+
+@pytest.mark.parametrize("name", EXCESSIVE)
+def test_one_element_more_than_a_struct_holds_is_refused(name: str, round_trip: RoundTrip) -> None:
+    message = message_class(name)()
+    assert round_trip(name, serialize_message(message)) is not None
+    make_excessive(message)
+    assert round_trip(name, serialize_message(message)) is None
