@@ -6,17 +6,16 @@
 #                  this one after rosidl_generate_interfaces(). Nested messages come with them.
 #
 # `#include <mauve_types/sensor_msgs/msg/imu.hpp>` then has the struct mauve::msg::sensor_msgs::Imu.
-set(MAUVE_TYPES_PROGRAM "${CMAKE_CURRENT_LIST_DIR}/mauve_generate_types.py")
-
 function(mauve_generate_types target)
   if(NOT ARGN)
     message(FATAL_ERROR "mauve_generate_types(${target}): expected interfaces such as sensor_msgs/msg/Imu, found none")
   endif()
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  set(program "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/mauve_generate_types.py")
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/mauve_types/include")
   file(TO_CMAKE_PATH "$ENV{AMENT_PREFIX_PATH}" prefixes)
   execute_process(
-    COMMAND "${Python3_EXECUTABLE}" "${MAUVE_TYPES_PROGRAM}" --target ${target} --output "${folder}"
+    COMMAND "${Python3_EXECUTABLE}" "${program}" --target ${target} --output "${folder}"
             --prefixes ${prefixes} ${CMAKE_PREFIX_PATH}
             --package ${PROJECT_NAME} "${PROJECT_BINARY_DIR}/rosidl_adapter/${PROJECT_NAME}" "${PROJECT_SOURCE_DIR}"
             --interfaces ${ARGN}
@@ -25,7 +24,7 @@ function(mauve_generate_types target)
     message(FATAL_ERROR "mauve_generate_types(${target}): ${error}")
   endif()
   string(REPLACE "\n" ";" read "${read}")
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${read} "${MAUVE_TYPES_PROGRAM}")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${read} "${program}")
   add_library(${target} INTERFACE)
   target_include_directories(${target} INTERFACE "$<BUILD_INTERFACE:${folder}>")
   target_link_libraries(${target} INTERFACE mauve_rt::kernel)

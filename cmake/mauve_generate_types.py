@@ -26,6 +26,7 @@ except ImportError as error:
 
 KINDS = ("msg", "srv", "action")
 INT64_MIN, INT64_MAX = -(2**63), 2**63 - 1
+MOST_FIELDS = 150  # that MAUVE_TYPE takes
 UNBOUNDED_TEXT = 255  # characters of a string that has no bound: a file's name on Linux has no more
 BASIC_TYPES = {
     "boolean": "bool",
@@ -238,6 +239,9 @@ class Writer:
     def traits(self, message: Any) -> Iterator[str]:
         """Describe a message to the kernel."""
         name = message.structure.namespaced_type.namespaced_name()
+        if len(message.structure.members) > MOST_FIELDS:
+            found = f"expected at most {MOST_FIELDS} fields, found {len(message.structure.members)}"
+            raise Refusal(f"{'/'.join(name)}: {found}. Divide it into messages.")
         fields = "".join(f", {member_name(member)}" for member in members(message))
         yield f'MAUVE_TYPE({cpp_name(name)}, "{"/".join(name)}"{fields})'
 

@@ -15,6 +15,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import PluginRegistry, Simulation
+from mauve_rt.cli.main import main
 from mauve_rt.model import build, configure, load_architecture
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -58,6 +59,7 @@ def test_a_package_uses_messages_by_one_line_of_cmake(
     monkeypatch.setenv("AMENT_PREFIX_PATH", os.pathsep.join([str(prefix), *ROS]))
     architecture = tmp_path / "sum.yaml"
     architecture.write_text(ARCHITECTURE, encoding="utf-8")
+    assert main(["check", str(architecture)]) == 0  # the structs are those of the messages
     model = load_architecture(architecture)
     built = build(model, PluginRegistry())
     configure(model, built)
@@ -102,6 +104,7 @@ Part[<=2] parts
 Part[] rest
 std_msgs/Header header
 """,
+    "msg/Large.msg": "".join(f"int32 field_{i}\n" for i in range(150)),
     "msg/Part.msg": "float32[] values\n",
     "msg/Nothing.msg": "int32 ONE=1\n",
     "srv/Ask.srv": "Part part\n---\nint32 number -1\n",
@@ -110,18 +113,21 @@ std_msgs/Header header
 PROGRAM = r"""
 #include <mauve_rt/mauve_rt.hpp>
 #include <mauve_types/odd_interfaces/action/go.hpp>
+#include <mauve_types/odd_interfaces/msg/large.hpp>
 #include <mauve_types/odd_interfaces/msg/nothing.hpp>
 #include <mauve_types/odd_interfaces/msg/odd.hpp>
 #include <mauve_types/odd_interfaces/srv/ask.hpp>
 
 using mauve::msg::odd_interfaces::Ask;
 using mauve::msg::odd_interfaces::Go;
+using mauve::msg::odd_interfaces::Large;
 using mauve::msg::odd_interfaces::Nothing;
 using mauve::msg::odd_interfaces::Odd;
 
 static_assert(Odd::BYTE == 1 && Odd::CHAR == 2 && Odd::RATIO == 0.1F && Nothing::ONE == 1);
 static_assert(Odd::LEAST == INT64_MIN && Odd::MOST == UINT64_MAX);
 static_assert(Odd::TEXT == "a \"quoted\" \u00f6?" && Odd::WIDE == u"\u00f6");
+static_assert(std::tuple_size_v<decltype(mauve::TypeTraits<Large>::fields())> == 150);
 static_assert(!mauve::DescribedCall<Ask>, "a request with a sequence cannot be copied");
 static_assert(mauve::DescribedCall<Go::SendGoal> && mauve::DescribedCall<Go::GetResult>);
 static_assert(mauve::Described<Go::Goal> && mauve::Described<Go::Result> && mauve::Described<Go::Feedback> &&
@@ -286,6 +292,11 @@ REFUSED = {
         "odd_interfaces/msg/Bad",
         "field 'text': expected at most 255 characters, found a value of 256",
     ),
+    "many fields": (
+        {"msg/Bad.msg": "".join(f"int32 field_{i}\n" for i in range(151))},
+        "odd_interfaces/msg/Bad",
+        "odd_interfaces/msg/Bad: expected at most 150 fields, found 151. Divide it into messages.",
+    ),
     "nested": (
         {"msg/Bad.msg": "gone_msgs/Gone gone\n"},
         "odd_interfaces/msg/Bad",
@@ -319,6 +330,48 @@ def test_a_type_without_a_struct_is_refused(tmp_path: Path) -> None:
     assert done.stderr.startswith(
         "odd_interfaces/msg/Long, field 'value': type long double has no C++ struct. Use"
     )
+
+
+@pytest.mark.timeout(300)
+def test_interfaces_of_the_same_package_are_found(tmp_path: Path) -> None:
+    install(tmp_path, {"msg/Part.msg": INTERFACES["msg/Part.msg"]})
+    package = tmp_path / "share" / "odd_interfaces"
+    (package / "msg" / "Part.idl").unlink()
+    (package / "package.xml").write_text(
+        """\
+<?xml version="1.0"?>
+<package format="3">
+  <name>odd_interfaces</name>
+  <version>0.1.0</version>
+  <description>A message and the structs of it</description>
+  <maintainer email="nobody@example.invalid">Nobody</maintainer>
+  <license>Apache-2.0</license>
+  <buildtool_depend>ament_cmake</buildtool_depend>
+  <buildtool_depend>rosidl_default_generators</buildtool_depend>
+  <depend>mauve_rt</depend>
+  <member_of_group>rosidl_interface_packages</member_of_group>
+</package>
+""",
+        encoding="utf-8",
+    )
+    (package / "CMakeLists.txt").write_text(
+        """\
+cmake_minimum_required(VERSION 3.22)
+project(odd_interfaces LANGUAGES C CXX)
+find_package(ament_cmake REQUIRED)
+find_package(rosidl_default_generators REQUIRED)
+find_package(mauve_rt REQUIRED)
+rosidl_generate_interfaces(${PROJECT_NAME} msg/Part.msg)
+mauve_generate_types(odd_types odd_interfaces/msg/Part)
+ament_package()
+""",
+        encoding="utf-8",
+    )
+    prefixes = ";".join([str(INSTALLED), *ROS])
+    options = [f"-DCMAKE_PREFIX_PATH={prefixes}", f"-DPython3_EXECUTABLE={sys.executable}"]
+    run("cmake", "-S", package, "-B", tmp_path / "build", *options)
+    written = tmp_path / "build/mauve_types/include/mauve_types/odd_interfaces/msg/part.hpp"
+    assert "::mauve::Sequence<float> values;" in written.read_text("utf-8")
 
 
 def test_cmake_names_the_line_of_a_wrong_call(tmp_path: Path) -> None:

@@ -234,9 +234,9 @@ class CdrReader {
 }  // namespace mauve
 
 #define MAUVE_PARENS ()
-#define MAUVE_EXPAND(...) MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(__VA_ARGS__)))
-#define MAUVE_EXPAND1(...) MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(__VA_ARGS__)))
-#define MAUVE_EXPAND2(...) MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(__VA_ARGS__)))
+#define MAUVE_EXPAND(...) MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(__VA_ARGS__)))))
+#define MAUVE_EXPAND1(...) MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(__VA_ARGS__)))))
+#define MAUVE_EXPAND2(...) MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(__VA_ARGS__)))))
 #define MAUVE_EXPAND3(...) __VA_ARGS__
 #define MAUVE_MEMBERS(type, ...) __VA_OPT__(MAUVE_EXPAND(MAUVE_MEMBER(type, __VA_ARGS__)))
 #define MAUVE_MEMBER(type, field, ...) \
@@ -245,7 +245,7 @@ class CdrReader {
 
 /// Declares a struct's identity and its mapping to a ROS message, once, in message order, at global scope:
 ///   MAUVE_TYPE(my::Point, "geometry_msgs/msg/Point", x, y, z)
-/// Members are named as the message's fields, or so with one word more: cost_m for cost, class_ for class.
+/// Up to 150 members, named as the message's fields, or so with one word more: cost_m for cost, class_ for class.
 #define MAUVE_TYPE(type, type_name, ...)                                                         \
   template <>                                                                                    \
   struct mauve::TypeTraits<type> {                                                               \
