@@ -64,7 +64,7 @@ class CdrWriter {
   template <std::size_t N>
   void put(const BoundedWString<N>& value) {
     put(static_cast<std::uint32_t>(value.view().size()));
-    for (const char16_t unit : value.view()) put(std::uint32_t{unit});  // 4 bytes each, as rmw_fastrtps has it
+    for (const char16_t unit : value.view()) put(std::uint32_t{unit});  // as rmw_fastrtps does
   }
   void put(const std::string& value) { put_string(value); }
   template <typename T, std::size_t N>
@@ -234,9 +234,12 @@ class CdrReader {
 }  // namespace mauve
 
 #define MAUVE_PARENS ()
-#define MAUVE_EXPAND(...) MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(__VA_ARGS__)))))
-#define MAUVE_EXPAND1(...) MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(__VA_ARGS__)))))
-#define MAUVE_EXPAND2(...) MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(__VA_ARGS__)))))
+#define MAUVE_EXPAND(...) \
+  MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(__VA_ARGS__)))))
+#define MAUVE_EXPAND1(...) \
+  MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(__VA_ARGS__)))))
+#define MAUVE_EXPAND2(...) \
+  MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(__VA_ARGS__)))))
 #define MAUVE_EXPAND3(...) __VA_ARGS__
 #define MAUVE_MEMBERS(type, ...) __VA_OPT__(MAUVE_EXPAND(MAUVE_MEMBER(type, __VA_ARGS__)))
 #define MAUVE_MEMBER(type, field, ...) \
