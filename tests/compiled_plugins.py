@@ -20,10 +20,12 @@ BUILD = ROOT / "build" / "test-plugins"  # in the clone: so clones share what cc
 FLAGS = ("-std=c++20", "-O1", "-fPIC", f"-I{INSTALLED}/include")
 
 
-def _compile(*words: str | Path) -> None:
+def _compile(*words: str | Path, hashed: Sequence[Path] = ()) -> None:
+    """By ccache, which takes a change of the files `hashed` for one of the source."""
     launcher = [ccache] if (ccache := shutil.which("ccache")) else []
     settings = {
         "CCACHE_BASEDIR": str(ROOT),
+        "CCACHE_EXTRAFILES": os.pathsep.join(map(str, hashed)),
         "CCACHE_NOHASHDIR": "1",
         "CCACHE_SLOPPINESS": "pch_defines,time_macros",
     }
@@ -45,11 +47,13 @@ def _precompiled() -> Path:
     header = BUILD / "mauve_rt.hpp"
     output = BUILD / "mauve_rt.hpp.gch"
     with _alone():
-        newest = max(file.stat().st_mtime for file in (INSTALLED / "include" / "mauve_rt").rglob("*.hpp"))
+        headers = sorted((INSTALLED / "include" / "mauve_rt").rglob("*.hpp"))
+        newest = max(file.stat().st_mtime for file in headers)
         if not output.exists() or output.stat().st_mtime <= newest:
             header.write_text("#include <mauve_rt/mauve_rt.hpp>\n", encoding="utf-8")
             new = BUILD / "new.gch"
-            _compile("-w", "-x", "c++-header", header, "-o", new)
+            # Of a precompiled header, ccache (pch_defines) does not see that only a macro has changed.
+            _compile("-w", "-x", "c++-header", header, "-o", new, hashed=headers)
             new.replace(output)
     return header
 

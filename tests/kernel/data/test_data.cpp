@@ -56,6 +56,22 @@ TEST(Cdr, MatchesTheWireFormatByteForByte) {
   EXPECT_TRUE(back.last);
 }
 
+TEST(Cdr, WritesUnitsOfUtf16InFourBytesEach) {
+  std::vector<std::byte> message;
+  CdrWriter(message).put(BoundedWString<3>(u"a\u20AC"));
+  std::vector<int> bytes;
+  for (const std::byte each : message) bytes.push_back(std::to_integer<int>(each));
+  EXPECT_THAT(bytes, ::testing::ElementsAre(0, 1, 0, 0, 2, 0, 0, 0, 'a', 0, 0, 0, 0xAC, 0x20, 0, 0));
+  BoundedWString<2> back;
+  EXPECT_TRUE(CdrReader(message).get(back));
+  EXPECT_EQ(u"a\u20AC", back);
+  BoundedWString<1> small;
+  EXPECT_FALSE(CdrReader(message).get(small));
+  message[10] = std::byte{1};  // no unit of UTF-16
+  EXPECT_FALSE(CdrReader(message).get(back));
+  EXPECT_FALSE(CdrReader(std::span(message).first(12)).get(back));
+}
+
 TEST(Cdr, RefusesWhatIsShortOrTooLong) {
   Outer outer;
   outer.items.push_back({1, 2.0});

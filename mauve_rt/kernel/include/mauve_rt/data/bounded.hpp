@@ -49,28 +49,41 @@ class BoundedVector {
   std::array<T, N> items_{};
 };
 
-/// At most N characters, stored in place. All functions [rt].
-template <std::size_t N>
-class BoundedString {
+/// At most N characters (of a wstring: units of UTF-16), stored in place. All functions [rt].
+template <typename Char, std::size_t N>
+class BoundedText {
  public:
-  BoundedString() = default;
-  BoundedString(std::string_view text) MAUVE_RT { assign(text); }  // NOLINT: implicit like std::string
-  BoundedString(const char* text) MAUVE_RT { assign(text); }       // NOLINT: likewise, where one is expected
+  using View = std::basic_string_view<Char>;
+
+  BoundedText() = default;
+  BoundedText(View text) MAUVE_RT { assign(text); }         // NOLINT: implicit like std::string
+  BoundedText(const Char* text) MAUVE_RT { assign(text); }  // NOLINT: likewise, where one is expected
   static constexpr std::size_t capacity() MAUVE_RT { return N; }
   /// Takes the text; false (and cut to N) when it is longer.
-  bool assign(std::string_view text) MAUVE_RT {
+  bool assign(View text) MAUVE_RT {
     size_ = static_cast<std::uint32_t>(std::min(text.size(), N));
     std::copy_n(text.data(), size_, text_.data());
     return text.size() <= N;
   }
-  std::string_view view() const MAUVE_RT { return {text_.data(), size_}; }
-  bool operator==(const BoundedString& other) const MAUVE_RT { return view() == other.view(); }
-  bool operator==(std::string_view other) const MAUVE_RT { return view() == other; }
-  bool operator==(const char* other) const MAUVE_RT { return view() == other; }
+  /// Appends; false (and unchanged) when full.
+  bool push_back(Char character) MAUVE_RT {
+    if (size_ == N) return false;
+    text_[size_++] = character;
+    return true;
+  }
+  View view() const MAUVE_RT { return {text_.data(), size_}; }
+  bool operator==(const BoundedText& other) const MAUVE_RT { return view() == other.view(); }
+  bool operator==(View other) const MAUVE_RT { return view() == other; }
+  bool operator==(const Char* other) const MAUVE_RT { return view() == other; }
 
  private:
   std::uint32_t size_{0};
-  std::array<char, N> text_{};
+  std::array<Char, N> text_{};
 };
+
+template <std::size_t N>
+using BoundedString = BoundedText<char, N>;
+template <std::size_t N>
+using BoundedWString = BoundedText<char16_t, N>;
 
 }  // namespace mauve

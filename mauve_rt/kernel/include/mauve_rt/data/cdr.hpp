@@ -61,6 +61,11 @@ class CdrWriter {
   void put(const BoundedString<N>& value) {
     put_string(value.view());
   }
+  template <std::size_t N>
+  void put(const BoundedWString<N>& value) {
+    put(static_cast<std::uint32_t>(value.view().size()));
+    for (const char16_t unit : value.view()) put(std::uint32_t{unit});  // as rmw_fastrtps does
+  }
   void put(const std::string& value) { put_string(value); }
   template <typename T, std::size_t N>
   void put(const std::array<T, N>& value) {
@@ -147,6 +152,15 @@ class CdrReader {
     const std::size_t length = size == 0 ? 0 : size - 1;  // the terminating zero is on the wire
     return ok_ = value.assign({reinterpret_cast<const char*>(from), length});
   }
+  template <std::size_t N>
+  bool get(BoundedWString<N>& value) MAUVE_RT {
+    std::uint32_t size = 0;
+    if (!get(size)) return false;
+    value.assign({});
+    std::uint32_t unit = 0;
+    while (size-- > 0 && get(unit)) ok_ = unit <= 0xFFFF && value.push_back(static_cast<char16_t>(unit));
+    return ok_;
+  }
   template <typename T, std::size_t N>
   bool get(std::array<T, N>& value) MAUVE_RT {
     return get_items(std::span<T>(value));
@@ -221,9 +235,12 @@ class CdrReader {
 }  // namespace mauve
 
 #define MAUVE_PARENS ()
-#define MAUVE_EXPAND(...) MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(__VA_ARGS__)))
-#define MAUVE_EXPAND1(...) MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(__VA_ARGS__)))
-#define MAUVE_EXPAND2(...) MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(__VA_ARGS__)))
+#define MAUVE_EXPAND(...) \
+  MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(MAUVE_EXPAND1(__VA_ARGS__)))))
+#define MAUVE_EXPAND1(...) \
+  MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(MAUVE_EXPAND2(__VA_ARGS__)))))
+#define MAUVE_EXPAND2(...) \
+  MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(MAUVE_EXPAND3(__VA_ARGS__)))))
 #define MAUVE_EXPAND3(...) __VA_ARGS__
 #define MAUVE_MEMBERS(type, ...) __VA_OPT__(MAUVE_EXPAND(MAUVE_MEMBER(type, __VA_ARGS__)))
 #define MAUVE_MEMBER(type, field, ...) \
@@ -232,7 +249,7 @@ class CdrReader {
 
 /// Declares a struct's identity and its mapping to a ROS message, once, in message order, at global scope:
 ///   MAUVE_TYPE(my::Point, "geometry_msgs/msg/Point", x, y, z)
-/// Members are named as the message's fields, or so with one word more: cost_m for cost, class_ for class.
+/// Up to 150 members, named as the message's fields, or so with one word more: cost_m for cost, class_ for class.
 #define MAUVE_TYPE(type, type_name, ...)                                                         \
   template <>                                                                                    \
   struct mauve::TypeTraits<type> {                                                               \

@@ -66,6 +66,10 @@ template <std::size_t N>
 struct ShapeOf<BoundedString<N>> {
   static FieldShape get() { return {.type = "string", .text_capacity = N}; }
 };
+template <std::size_t N>
+struct ShapeOf<BoundedWString<N>> {
+  static FieldShape get() { return {.type = "wstring", .text_capacity = N}; }
+};
 template <Described T>
 struct ShapeOf<T> {
   static FieldShape get() { return {.type = std::string(TypeTraits<T>::name), .fields = field_shapes<T>()}; }

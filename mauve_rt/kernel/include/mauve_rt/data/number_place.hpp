@@ -101,7 +101,7 @@ struct FindNumber<T> {
 inline void add_number_paths(const std::vector<FieldShape>& fields, const std::string& before,
                              std::size_t most, std::vector<std::string>& paths) {
   for (const FieldShape& field : fields) {
-    const bool is_text = field.type == "string" && field.fields.empty();
+    const bool is_text = field.type == "string" || field.type == "wstring";
     if (is_text || field.arity == FieldArity::bounded || field.arity == FieldArity::sequence)
       continue;  // at no fixed place
     const bool is_array = field.arity == FieldArity::fixed;

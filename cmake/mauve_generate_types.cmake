@@ -1,0 +1,31 @@
+# mauve_generate_types(<target> <interfaces>...)
+#
+# Writes C++ structs for ROS messages, services and actions, and adds the interface library <target>, which has them.
+#
+#   <interfaces>   PACKAGE/msg/NAME, PACKAGE/srv/NAME, PACKAGE/action/NAME, or PACKAGE for all it has: of installed packages, or of
+#                  this one after rosidl_generate_interfaces(). Nested messages come with them.
+#
+# `#include <mauve_types/sensor_msgs/msg/imu.hpp>` then has the struct mauve::msg::sensor_msgs::Imu.
+function(mauve_generate_types target)
+  if(NOT ARGN)
+    message(FATAL_ERROR "mauve_generate_types(${target}): expected interfaces such as sensor_msgs/msg/Imu, found none")
+  endif()
+  find_package(Python3 REQUIRED COMPONENTS Interpreter)
+  set(program "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/mauve_generate_types.py")
+  set(folder "${CMAKE_CURRENT_BINARY_DIR}/mauve_types/include")
+  file(TO_CMAKE_PATH "$ENV{AMENT_PREFIX_PATH}" prefixes)
+  execute_process(
+    COMMAND "${Python3_EXECUTABLE}" "${program}" --target ${target} --output "${folder}"
+            --prefixes ${prefixes} ${CMAKE_PREFIX_PATH}
+            --package ${PROJECT_NAME} "${PROJECT_BINARY_DIR}/rosidl_adapter/${PROJECT_NAME}" "${PROJECT_SOURCE_DIR}"
+            --interfaces ${ARGN}
+    OUTPUT_VARIABLE read ERROR_VARIABLE error RESULT_VARIABLE result OUTPUT_STRIP_TRAILING_WHITESPACE)
+  if(NOT result EQUAL 0)
+    message(FATAL_ERROR "mauve_generate_types(${target}): ${error}")
+  endif()
+  string(REPLACE "\n" ";" read "${read}")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${read} "${program}")
+  add_library(${target} INTERFACE)
+  target_include_directories(${target} INTERFACE "$<BUILD_INTERFACE:${folder}>")
+  target_link_libraries(${target} INTERFACE mauve_rt::kernel)
+endfunction()
