@@ -178,7 +178,7 @@ class CdrReader {
   bool get(T& value) MAUVE_RT {
     if constexpr (kIsEmpty<T>) (void)take(1, 1);
     [[maybe_unused]] std::size_t field = 0;
-    [[maybe_unused]] const auto got = [&](auto member) {
+    [[maybe_unused]] const auto got = [&](auto member) MAUVE_RT {
       if (get(value.*member)) return ++field != 0;
       if (too_long_ != nullptr && too_long_->size != 0)
         MAUVE_RT_TRUSTED(
