@@ -191,12 +191,19 @@ class LatestRegister {
     const std::size_t newest =
         index_of(word_.load(std::memory_order_relaxed));  // relaxed: written by writers only
     MAUVE_AUDIT(newest < slots.size());
-    for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
-      Slot& slot = *slots[i];
+    const auto is_free = [&](Slot& slot) MAUVE_RT {
       // acquire: what its readers copied, they have copied
-      if (slot.released.load(std::memory_order_acquire) != slot.taken) continue;
-      if (kIsLarge<T> && slot.is_borrowed) continue;
-      return i;
+      if (slot.released.load(std::memory_order_acquire) != slot.taken) return false;
+      return !kIsLarge<T> || !slot.is_borrowed;
+    };
+    if constexpr (kIsLarge<T>) {  // the same few, which the caches have
+      for (std::size_t i = 0; i < slots.size(); ++i) {
+        if (i != newest && is_free(*slots[i])) return i;
+      }
+    } else {
+      for (std::size_t i = next(newest, slots); i != newest; i = next(i, slots)) {
+        if (is_free(*slots[i])) return i;
+      }
     }
     return kNone;
   }
