@@ -16,6 +16,7 @@ from mauve_rt.cli import (
     rules_verb,
     shadow_verb,
     trace_verb,
+    types_verb,
     watch_verb,
 )
 from mauve_rt.cli.arguments import add_executor_and_json
@@ -541,4 +542,10 @@ VERBS = (
         trace_verb.main,
     ),
     Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
+    Verb(
+        "types",
+        "show the types of data that plug-ins register, and write them as .msg files",
+        types_verb.add_arguments,
+        types_verb.main,
+    ),
 )

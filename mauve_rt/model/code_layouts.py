@@ -25,9 +25,7 @@ def _fields(fields: Collection[FieldShape], *, path: str, begin: int) -> Iterato
             yield from _fields(field.fields, path=f"{name}.", begin=place)
             continue
         words = field.type + (f"<={field.text_capacity}" if field.text_capacity else "")
-        if field.is_array:
-            words += f"[{'' if field.is_fixed else '<='}{field.size}]"
-        yield name, f"{words} at byte {place}"
+        yield name, f"{words}{field.array} at byte {place}"
         yield from _fields(field.fields, path=f"{name}[].", begin=0)
 
 

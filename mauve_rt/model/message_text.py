@@ -28,6 +28,11 @@ def message_text(type_name: str, shapes: Iterable[MessageShape]) -> str:
     return text + "".join(f"{SEPARATOR}\nMSG: {name}\n{part}" for name, part in inner.items())
 
 
+def message_file(shape: MessageShape) -> str:
+    """The .msg file of a struct; messages within it have files of their own."""
+    return _fields(shape.fields, {})
+
+
 def message_name(type_name: str) -> str:
     """The name that a message has whose struct is of this type: package/msg/Name."""
     package, _, name = type_name.rpartition("/")
@@ -49,9 +54,7 @@ def _lines(fields: Iterable[FieldShape], inner: dict[str, str]) -> Iterator[str]
                 inner[kind] = _fields(field.fields, inner)
         if field.text_capacity:
             kind += f"<={field.text_capacity}"
-        if field.is_array:
-            kind += f"[{field.size}]" if field.is_fixed else f"[<={field.size}]"
-        yield f"{kind} {_field_name(field.name)}"
+        yield f"{kind}{field.array} {_field_name(field.name)}"
 
 
 def _field_name(name: str) -> str:

@@ -12,12 +12,7 @@ namespace mauve {
 namespace {
 
 std::string words(const FieldShape& field) {
-  std::string text = field.type;
-  if (field.text_capacity != 0) text += "<=" + std::to_string(field.text_capacity);
-  if (field.arity == FieldArity::fixed) text += "[" + std::to_string(field.size) + "]";
-  if (field.arity == FieldArity::bounded) text += "[<=" + std::to_string(field.size) + "]";
-  if (field.arity == FieldArity::sequence) text += "[]";
-  return text + " " + field.name + " at byte " + std::to_string(field.offset);
+  return item_text(field) + array_text(field) + " " + field.name + " at byte " + std::to_string(field.offset);
 }
 
 bool is_same(const FieldShape& one, const FieldShape& other) {

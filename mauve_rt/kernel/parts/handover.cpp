@@ -29,16 +29,12 @@ class Stranger final : public CoreBase {
 }  // namespace
 
 std::string type_text(const FieldShape& shape, std::size_t bytes) {
-  std::string text = shape.type;
-  if (shape.text_capacity != 0) text += "<=" + std::to_string(shape.text_capacity);
+  std::string text = item_text(shape);
   if (!shape.fields.empty()) {
     text += "{" + fields_text(shape.fields) + "}";
     if (bytes != 0) text += " of " + std::to_string(bytes) + " bytes";
   }
-  if (shape.arity == FieldArity::fixed) text += "[" + std::to_string(shape.size) + "]";
-  if (shape.arity == FieldArity::sequence) text += "[]";
-  if (shape.arity == FieldArity::bounded) text += "[<=" + std::to_string(shape.size) + "]";
-  return text;
+  return text + array_text(shape);
 }
 
 std::string detail::state_name(std::string_view member) {

@@ -410,6 +410,31 @@ TEST(RingBuffer, OfTenMegabytesNeedsNoStack) {
   go_on_a_small_stack(*ring);
 }
 
+/// How often `with` calls its function in three reads of one value.
+template <typename T, typename ResourceType>
+int calls_of_with(ResourceType& resource) {
+  WritePort<T> writer("writer");
+  writer.connect(resource.write, "r");
+  ReadPort<T> reader("reader");
+  reader.connect(resource.read, "r");
+  writer.write_with([](T&) {});
+  int found = 0;
+  for (int i = 0; i < 3; ++i) reader.with([&](const T&) { ++found; });
+  return found;
+}
+
+/// Small and large values alike.
+TEST(SharedData, GivesAnOldValueToWithAgain) {
+  SharedData<Number> small;
+  EXPECT_EQ(3, calls_of_with<Number>(small));
+  EXPECT_EQ(3, calls_of_with<Scan>(*made<SharedData<Scan>>()));
+}
+TEST(RingBuffer, GivesAValueToWithOnce) {
+  RingBuffer<Number> small(4);
+  EXPECT_EQ(1, calls_of_with<Number>(small));
+  EXPECT_EQ(1, calls_of_with<Scan>(*made<RingBuffer<Scan>>()));
+}
+
 TEST(RingBuffer, OfSequencesThatOverwritesKeepsTheNewest) {
   RingBuffer<Scan> ring(2, WhenFull::overwrite, Capacities{{"ranges", kCapacity}});
   WritePort<Scan> writer("writer");

@@ -1,8 +1,10 @@
 """An executor that minds, by a rule of its own, whether a talker speaks; each is a process."""
 
+import itertools
 import os
 import re
 import signal
+import struct
 import subprocess
 import sys
 import time
@@ -104,18 +106,29 @@ class Talker:
         self,
         period_s: float,
         *,
+        times: Path = Path(os.devnull),
         wrapper: Sequence[str] = (),
         environment: dict[str, str] | None = None,
     ) -> None:
-        """Start it."""
+        """Start it; `times`: the file of when it spoke."""
         program = str(Path(__file__).with_name("talker.py"))
-        self._command = [*wrapper, sys.executable, program, "/talk", str(period_s)]
+        self._times = times
+        self._command = [*wrapper, sys.executable, program, "/talk", str(period_s), str(times)]
         self._environment = os.environ | (environment or {})
         self.start()
 
     def start(self) -> None:
         """Start it, or start it anew."""
         self._process = subprocess.Popen(self._command, env=self._environment)
+
+    def longest_silence_s(self, since_s: float) -> float:
+        """The longest time between two of its messages from an instant on, as its own clock has it."""
+        data = self._times.read_bytes()
+        spoke = [
+            since_s,
+            *(at_s for (at_s,) in struct.iter_unpack("d", data[: len(data) // 8 * 8]) if at_s > since_s),
+        ]
+        return max(later - earlier for earlier, later in itertools.pairwise([*spoke, time.monotonic()]))
 
     def signal(self, number: signal.Signals) -> None:
         """Freeze, thaw or kill it."""

@@ -30,6 +30,25 @@ struct FieldShape {
   std::vector<FieldShape> fields{};  // of a message within the message
 };
 
+/// Of an element, as in .msg files: string<=10. [non-rt]
+inline std::string item_text(const FieldShape& field) {
+  return field.type + (field.text_capacity == 0 ? "" : "<=" + std::to_string(field.text_capacity));
+}
+/// What follows it in .msg files: [3], [<=3] or []; empty: it is no array. [non-rt]
+inline std::string array_text(const FieldShape& field) {
+  switch (field.arity) {
+    case FieldArity::one:
+      return "";
+    case FieldArity::fixed:
+      return "[" + std::to_string(field.size) + "]";
+    case FieldArity::bounded:
+      return "[<=" + std::to_string(field.size) + "]";
+    case FieldArity::sequence:
+      return "[]";
+  }
+  return "";
+}
+
 /// A message as its C++ struct has it.
 struct MessageShape {
   std::string type;   // geometry_msgs/msg/Point

@@ -54,8 +54,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
     others_mutex_.set_trace_id(TraceNames::intern(name));
   }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
-    const auto value = write.make();
-    return CdrReader(message).get(*value) && write.write(*value, time_ns);
+    return write.write_message(message, time_ns);
   }
   std::optional<NumberPlace> find_number(std::string_view path) const override {
     return mauve::find_number<T>(path);
@@ -121,8 +120,20 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   }
   void give_back(T& place) noexcept { register_.give_back(place, nullptr); }
   DataStatus serialize(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
-    const auto value = read.make();
     ReaderState reader{.seen = seen};
+    if constexpr (kIsLarge<T>) {  // without a copy
+      const LockGuard lock(others_mutex_);
+      const Loan<T> loan = register_.lend(reader);
+      seen = reader.seen;
+      if (loan.value != nullptr) {
+        time_ns = loan.time_ns;
+        CdrWriter(message).put(*loan.value);
+        register_.let_go(reader.held);
+        return loan.status;
+      }
+      register_.let_go(reader.held);
+    }
+    const auto value = read.make();
     const DataStatus status = read.read(*value, time_ns, reader);
     seen = reader.seen;
     CdrWriter(message).put(*value);

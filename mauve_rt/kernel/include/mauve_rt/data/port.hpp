@@ -49,18 +49,17 @@ class ReadPort final : public PortBase {
   DataStatus with(Use&& use, time_ns_t* time_ns = nullptr) {
     if (is_previewed()) [[unlikely]]
       return stand_in<ReadPort>().with(std::forward<Use>(use), time_ns);
+    const auto use_copy = [&](T& value) {
+      const DataStatus status = read(value, time_ns);
+      if (status == DataStatus::new_data || (status == DataStatus::old_data && service_->keeps_values()))
+        std::forward<Use>(use)(std::as_const(value));
+      return status;
+    };
     if constexpr (!kIsLarge<T>) {
       T value = default_;
-      const DataStatus status = read(value, time_ns);
-      if (status != DataStatus::none) std::forward<Use>(use)(std::as_const(value));
-      return status;
+      return use_copy(value);
     } else {
-      if (service_ != nullptr && !is_closed() && !service_->lends(reader_)) {
-        const std::unique_ptr<T> value = make();
-        const DataStatus status = read(*value, time_ns);
-        if (status != DataStatus::none) std::forward<Use>(use)(std::as_const(*value));
-        return status;
-      }
+      if (service_ != nullptr && !is_closed() && !service_->lends(reader_)) return use_copy(*make());
       const Loaned loaned(is_closed() ? nullptr : service_, reader_);
       const Loan<T>& loan = loaned.loan;
       status_ = loan.status;

@@ -75,8 +75,17 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   std::uint64_t lost() const MAUVE_RT { return writers_.lost.load(std::memory_order_relaxed); }
 
   bool next_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& seen) override {
-    const auto value = read.make();
     ReaderState reader{.seen = seen};
+    if constexpr (kIsLarge<T>) {  // without a copy
+      const Loan<T> loan = lend(reader);
+      if (loan.value == nullptr) return false;
+      seen = reader.seen;
+      time_ns = loan.time_ns;
+      CdrWriter(message).put(*loan.value);
+      end_loan(loan, reader);
+      return true;
+    }
+    const auto value = read.make();
     if (pop(*value, time_ns, reader) != DataStatus::new_data) return false;
     seen = reader.seen;
     CdrWriter(message).put(*value);
@@ -96,8 +105,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     return sequence != 0;
   }
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
-    const auto value = write.make();
-    return CdrReader(message).get(*value) && write.write(*value, time_ns);
+    return write.write_message(message, time_ns);
   }
   std::string why_refused(std::span<const std::byte> message) const override {
     const auto value = write.make();
@@ -109,8 +117,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
  private:
   static constexpr std::size_t kCacheLine = 64;
 
-  static constexpr std::size_t kOtherUsers =
-      2;  // of an end, without a port: a topic, and who looks at messages
+  static constexpr std::size_t kOtherUsers = 2;  // of an end: a topic, and who looks at messages
   using Block = std::conditional_t<kIsLarge<T>, T*, T>;
   using Spares = std::vector<T*>;
 
@@ -153,6 +160,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     }
     void unseat(BiasedMutex::Seat& seat) noexcept override { owner_.readers_mutex_.remove(seat); }
     bool is_wait_free() const noexcept override { return owner_.readers_mutex_.is_biased(); }
+    bool keeps_values() const noexcept override { return false; }
     bool lends(const ReaderState& /*reader*/) const noexcept override { return kIsLarge<T>; }
     Loan<T> lend(ReaderState& reader) noexcept override {
       if constexpr (kIsLarge<T>) {
@@ -322,8 +330,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   std::vector<Place> places_;
   WhenFull when_full_;
   Mutex room_mutex_;
-  std::vector<std::unique_ptr<T>>
-      blocks_;  // of large elements: those of the places, and spare ones of each end
+  std::vector<std::unique_ptr<T>> blocks_;  // of large elements: of the places, and spare ones of each end
   alignas(kCacheLine) BiasedMutex readers_mutex_;
 
  public:

@@ -216,6 +216,8 @@ class ReadService : public ServiceBase {
       return found;
     }
   }
+  /// Whether a value that was read is still there for the next read; else that finds none, with status old. [rt]
+  virtual bool keeps_values() const MAUVE_RT { return true; }
   /// Whether lend() gives this reader values in place; else who reads large ones copies them. [rt]
   virtual bool lends(const ReaderState& /*reader*/) const MAUVE_RT { return false; }
   /// As read(), without a copy: nothing changes the value until end_loan(). [rt]
@@ -255,6 +257,19 @@ class WriteService : public ServiceBase {
   virtual void give_back(T& /*place*/, BiasedMutex::Seat* /*seat*/) MAUVE_RT {}
   /// A value with memory for whatever the service takes. [setup]
   virtual std::unique_ptr<T> make() const { return std::make_unique<T>(); }
+  /// Writes a message, a large one without a copy; false when it is no whole one, or there was no room. [non-rt]
+  bool write_message(std::span<const std::byte> message, time_ns_t time_ns) {
+    if constexpr (kIsLarge<T>) {
+      T* const place = borrow(nullptr);
+      if (place != nullptr) {
+        if (CdrReader(message).get(*place)) return publish(*place, time_ns, nullptr);
+        give_back(*place, nullptr);
+        return false;
+      }
+    }
+    const auto value = make();
+    return CdrReader(message).get(*value) && write(*value, time_ns);
+  }
 };
 
 template <typename Signature>
