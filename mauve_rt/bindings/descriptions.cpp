@@ -156,6 +156,7 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("type", &FieldShape::type,
                     "Of an element, as in .msg files: 'float64', 'string', 'geometry_msgs/msg/Point'.")
       .def_readonly("text_capacity", &FieldShape::text_capacity, "Of a string; 0: any length.")
+      .def_property_readonly("item", &item_text, "Of an element, as in .msg files: `string<=10`.")
       .def_property_readonly("array", &array_text, "As in .msg files: `[3]`, `[<=3]` or `[]`; empty: none.")
       .def_property_readonly("is_array", [](const FieldShape& self) { return self.arity != FieldArity::one; })
       .def_property_readonly(

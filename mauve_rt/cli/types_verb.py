@@ -87,7 +87,7 @@ def _fields(fields: "Collection[FieldShape]") -> Iterator[dict[str, Any]]:
     for field in fields:
         yield {
             "name": field.name,
-            "type": f"{_item(field)}{field.array}",
+            "type": f"{field.item}{field.array}",
             "offset": field.offset,
             "fields": [*_fields(field.fields)],
         }
@@ -95,12 +95,8 @@ def _fields(fields: "Collection[FieldShape]") -> Iterator[dict[str, Any]]:
 
 def _lines(fields: "Collection[FieldShape]", indent: str = "  ") -> Iterator[str]:
     for field in fields:
-        yield f"{indent}{_item(field)}{field.array} {field.name}"
+        yield f"{indent}{field.item}{field.array} {field.name}"
         yield from _lines(field.fields, f"{indent}  ")
-
-
-def _item(field: "FieldShape") -> str:
-    return field.type + (f"<={field.text_capacity}" if field.text_capacity else "")
 
 
 def _print_table(rows: Collection[dict[str, Any]]) -> None:

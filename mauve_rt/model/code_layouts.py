@@ -24,8 +24,7 @@ def _fields(fields: Collection[FieldShape], *, path: str, begin: int) -> Iterato
         if field.fields and not field.is_array:
             yield from _fields(field.fields, path=f"{name}.", begin=place)
             continue
-        words = field.type + (f"<={field.text_capacity}" if field.text_capacity else "")
-        yield name, f"{words}{field.array} at byte {place}"
+        yield name, f"{field.item}{field.array} at byte {place}"
         yield from _fields(field.fields, path=f"{name}[].", begin=0)
 
 

@@ -46,14 +46,12 @@ def _fields(fields: Iterable[FieldShape], inner: dict[str, str]) -> str:
 
 def _lines(fields: Iterable[FieldShape], inner: dict[str, str]) -> Iterator[str]:
     for field in fields:
-        kind = field.type
+        kind = field.item
         if field.fields:
             kind = message_name(field.type).replace("/msg/", "/")
             if kind not in inner:
                 inner[kind] = ""  # no struct contains itself; this keeps the order
                 inner[kind] = _fields(field.fields, inner)
-        if field.text_capacity:
-            kind += f"<={field.text_capacity}"
         yield f"{kind}{field.array} {_field_name(field.name)}"
 
 

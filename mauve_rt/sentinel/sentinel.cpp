@@ -39,6 +39,7 @@
 #include "mauve_rt/base/time.hpp"
 
 #include "../bridge/src/owned.hpp"
+#include "../bridge/src/qos.hpp"
 #include "../bridge/src/rcl_error.hpp"
 #include "../bridge/src/type_support.hpp"
 
@@ -58,27 +59,15 @@ constexpr int kCopies = 20;
 constexpr time_ns_t kCopyEvery = ms_to_ns(10);
 constexpr unsigned kLeaveS = 1;  // how long the middleware may take to leave the network
 
-rmw_time_t duration(std::int64_t ns) {
-  return {.sec = static_cast<std::uint64_t>(ns / s_to_ns(1)),
-          .nsec = static_cast<std::uint64_t>(ns % s_to_ns(1))};
-}
-
 /// An output to be made safe.
 struct OutputSettings {
   bool operator==(const OutputSettings&) const = default;
 
   rmw_qos_profile_t profile() const {
     const auto [reliability, durability, deadline_ns, lifespan_ns, liveliness, lease_ns] = qos;
-    rmw_qos_profile_t made{};
-    made.history = RMW_QOS_POLICY_HISTORY_KEEP_LAST;
-    made.depth = 1;  // all its messages are the same
-    made.reliability = static_cast<rmw_qos_reliability_policy_t>(reliability);
-    made.durability = static_cast<rmw_qos_durability_policy_t>(durability);
-    made.deadline = duration(deadline_ns);
-    made.lifespan = duration(lifespan_ns);
-    made.liveliness = static_cast<rmw_qos_liveliness_policy_t>(liveliness);
-    made.liveliness_lease_duration = duration(lease_ns);
-    return made;
+    constexpr std::size_t kDepth = 1;  // all its messages are the same
+    return make_qos(static_cast<int>(reliability), static_cast<int>(durability), kDepth, deadline_ns,
+                    lifespan_ns, static_cast<int>(liveliness), lease_ns);
   }
 
   std::array<std::int64_t, 6> qos{};

@@ -10,6 +10,7 @@
 #include "interpreter.hpp"
 #include "node_watch.hpp"
 #include "parameters.hpp"
+#include "qos.hpp"
 #include "steady_waits.hpp"
 #include "stop_guard.hpp"
 #include "types.hpp"
@@ -21,25 +22,6 @@ namespace {
 using namespace mauve;
 using namespace mauve::bridge;
 using mauve::bindings::Typed;
-
-rmw_time_t duration(time_ns_t time_ns) {
-  return {.sec = static_cast<std::uint64_t>(time_ns / s_to_ns(1)),
-          .nsec = static_cast<std::uint64_t>(time_ns % s_to_ns(1))};
-}
-
-rmw_qos_profile_t make_qos(int reliability, int durability, std::size_t depth, time_ns_t deadline_ns,
-                           time_ns_t lifespan_ns, int liveliness, time_ns_t lease_ns) {
-  rmw_qos_profile_t qos{};
-  qos.history = RMW_QOS_POLICY_HISTORY_KEEP_LAST;
-  qos.depth = depth;
-  qos.reliability = static_cast<rmw_qos_reliability_policy_t>(reliability);
-  qos.durability = static_cast<rmw_qos_durability_policy_t>(durability);
-  qos.deadline = duration(deadline_ns);
-  qos.lifespan = duration(lifespan_ns);
-  qos.liveliness = static_cast<rmw_qos_liveliness_policy_t>(liveliness);
-  qos.liveliness_lease_duration = duration(lease_ns);
-  return qos;
-}
 
 template <std::size_t (Bridge::*open)(const TopicSettings&)>
 std::size_t open_topic(Bridge& self, const std::string& resource, const std::string& topic,

@@ -3,9 +3,6 @@
 
 #include <dlfcn.h>
 
-#include <algorithm>
-#include <iterator>
-
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/parts/property.hpp"
 
@@ -358,7 +355,6 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
                                                         const ResourceParameters& given) const {
   ResourceFactory make;
   ResourceParameters others = given;
-  ResourceParameters capacities;
   {
     const LockGuard lock(mutex_);
     const ResourceKind known = resource_kind(kind);
@@ -367,14 +363,12 @@ std::unique_ptr<Resource> PluginRegistry::make_resource(const std::string& kind,
     if (factory == factories.end()) throw_not_of_type(known, type);
     make = factory->second;
     if (known.type == TypeNeed::data) {
+      capacities_of(ports_.at(type).shape(), given);  // checked for the kinds that take none, too
       std::erase_if(others, [](const auto& parameter) { return is_capacity(parameter.first); });
-      std::copy_if(given.begin(), given.end(), std::inserter(capacities, capacities.end()),
-                   [](const auto& parameter) { return is_capacity(parameter.first); });
-      capacities_of(ports_.at(type).shape(), capacities);  // checked for the kinds that take none, too
     }
   }
   ResourceParameters parameters = checked_parameters(kind, others);
-  parameters.merge(capacities);
+  parameters.insert(given.begin(), given.end());  // the capacities: all others are there
   return made(kind + " " + type, [&] { return make(parameters); });
 }
 

@@ -32,12 +32,6 @@ bool is_path(std::string_view member, std::string_view field) {
   return member.empty() && field.empty();
 }
 
-std::string listed(const std::vector<std::string>& paths) {
-  std::string text;
-  for (const std::string& path : paths) text += (text.empty() ? "" : ", ") + path;
-  return text;
-}
-
 std::size_t elsewhere(const std::vector<FieldShape>& fields, const std::string& before,
                       const Capacities& capacities) {
   std::size_t bytes = 0;
@@ -97,7 +91,7 @@ Capacities capacities_of(const MessageShape& message, const ResourceParameters& 
       throw Error(ErrorCode::invalid_argument, "the type has no such sequence",
                   {.element = name,
                    .expected = paths.empty() ? "none: each field of " + message.type + " has its bound"
-                                             : "one of " + listed(paths),
+                                             : "one of " + join(paths),
                    .found = std::string(asked),
                    .remedy = "check the name"});
     }

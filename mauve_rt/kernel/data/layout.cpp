@@ -27,20 +27,14 @@ std::optional<LayoutDifference> difference(const std::vector<FieldShape>& expect
   for (std::size_t i = 0; i < std::max(expected.size(), found.size()); ++i) {
     if (i >= expected.size()) return LayoutDifference{found[i].name, "no such field", words(found[i])};
     if (i >= found.size()) return LayoutDifference{expected[i].name, words(expected[i]), "no such field"};
-    if (!is_same(expected[i], found[i])) {
-      // The cause is within, where a message within has grown.
-      if (expected[i].type == found[i].type) {
-        if (auto inner = difference(expected[i].fields, found[i].fields)) {
-          inner->field = expected[i].name + "." + inner->field;
-          return inner;
-        }
+    if (expected[i].type == found[i].type) {  // first: where a message within has grown, the cause is there
+      if (auto inner = difference(expected[i].fields, found[i].fields)) {
+        inner->field = expected[i].name + "." + inner->field;
+        return inner;
       }
+    }
+    if (!is_same(expected[i], found[i]))
       return LayoutDifference{expected[i].name, words(expected[i]), words(found[i])};
-    }
-    if (auto inner = difference(expected[i].fields, found[i].fields)) {
-      inner->field = expected[i].name + "." + inner->field;
-      return inner;
-    }
   }
   return {};
 }

@@ -301,7 +301,7 @@ TYPED_TEST(WithSequences, GoBetweenStructsOfOneLayoutAndBetweenNoOthers) {
   EXPECT_THAT(error.detail().found, ::testing::HasSubstr("("));  // the library
 }
 
-/// Whole values only, whoever reads and writes at the same time.
+/// Whole values only, while other threads read and write.
 TYPED_TEST(WithSequences, AreWholeBesideOtherWritersAndReaders) {
   constexpr int kWrites = 2000;
   WritePort<Scan> second{"second"};

@@ -47,19 +47,9 @@ class BiasedWrite final : public WriteService<T> {
     return nullptr;
   }
   bool publish(T& place, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept override {
-    if constexpr (kIsLarge<T>) {
-      const bool is_admitted = owner_.limits().admits(place);
-      {
-        const BiasedMutex::Hold hold(mutex_, seat);
-        if (!is_admitted || !floor_.admits(time_ns)) {
-          owner_.give_back(place);
-          return is_admitted;
-        }
-        if (!owner_.publish(place, time_ns)) return false;
-      }
-      owner_.written(time_ns);
-    }
-    return true;
+    if (owner_.limits().admits(place)) return publish_admitted(place, time_ns, seat);
+    give_back(place, seat);
+    return false;
   }
   void give_back(T& place, BiasedMutex::Seat* seat) noexcept override {
     if constexpr (kIsLarge<T>) {
@@ -85,12 +75,26 @@ class BiasedWrite final : public WriteService<T> {
   BiasedMutex& mutex() MAUVE_RT { return mutex_; }
 
  private:
+  bool publish_admitted(T& place, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
+    if constexpr (kIsLarge<T>) {
+      {
+        const BiasedMutex::Hold hold(mutex_, seat);
+        if (!floor_.admits(time_ns)) {
+          owner_.give_back(place);
+          return true;
+        }
+        if (!owner_.publish(place, time_ns)) return false;
+      }
+      owner_.written(time_ns);
+    }
+    return true;
+  }
   bool put(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
     if constexpr (kIsLarge<T>) {
       T* const place = owner_.limits().admits(value) ? borrow(seat) : nullptr;
       if (place == nullptr) return false;
       *place = value;  // not under the lock
-      return publish(*place, time_ns, seat);
+      return publish_admitted(*place, time_ns, seat);
     }
     {
       const BiasedMutex::Hold hold(mutex_, seat);

@@ -30,8 +30,8 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 /// copy of it does not suffice (P. Lee, T. Bu, G. Chandranmenon: "A lock-free, cache-efficient shared ring buffer", 2009). One that overwrites has one lock
 /// for both ends, without a bias: its writer removes elements too. tests/models/loom explores the queue and its biased mutex.
 ///
-/// Large elements lie in blocks, and a place has the address of one: whoever writes fills a spare block and exchanges it for that
-/// of the place, whoever reads takes the place's block for a spare one. So nothing is copied under a lock.
+/// Large elements lie in blocks, and a place has the address of one: a writer fills a spare block and exchanges it for that of the
+/// place, a reader takes the place's block for a spare one. So a port copies nothing under a lock.
 ///
 /// | member            | written by | read by    | under / order                                                    |
 /// | ----------------- | ---------- | ---------- | ---------------------------------------------------------------- |

@@ -13,7 +13,7 @@
 
 namespace mauve {
 
-/// At most capacity() elements, in one block that whoever configures its owner allocates. A value goes by copy assignment between
+/// At most capacity() elements, in one block that is allocated when its owner is configured. A value goes by copy assignment between
 /// sequences that have memory; there is no copy constructor, as that would allocate. What asks for more than the capacity leaves
 /// a mark: a port refuses to write a message with a marked sequence. Not thread-safe. All functions [rt], but for those marked.
 template <typename T>
