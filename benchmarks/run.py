@@ -18,6 +18,7 @@ from analysis import analysis_rows
 from command import command_rows
 from document import PAGE, figures_of, write_docs
 from echo import echo_rows, watch_rows
+from large_messages import large_message_rows
 from links import links_rows
 from listeners import last_message_rows
 from micro import (
@@ -90,6 +91,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "service-blackout": service_blackout_rows,
     "service-stop": service_stop_rows,
     "topics": topic_rows,
+    "large-messages": large_message_rows,
     "start": start_rows,
     "command": command_rows,
     "recording": recording_rows,

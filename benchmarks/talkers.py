@@ -18,16 +18,17 @@ _COMPONENT = {
 _TYPE = "geometry_msgs/msg/Point"
 
 
-def plugin_prefix(folder: Path) -> Path:
-    """An ament prefix in the folder, which has the talkers' plug-in."""
+def plugin_prefix(folder: Path, package: str = "bench", plugin: str = "talker") -> Path:
+    """An ament prefix in the folder, which has a plug-in of ros/."""
     prefix = folder / "plugins"
     index = prefix / "share" / "ament_index" / "resource_index"
     for kind in ("packages", "mauve_rt_plugins"):
         (index / kind).mkdir(parents=True)
-    (index / "packages" / "bench").touch()
-    (index / "mauve_rt_plugins" / "bench").symlink_to(_SOURCES / "talker.txt")
+    (index / "packages" / package).touch()
+    (index / "mauve_rt_plugins" / package).symlink_to(_SOURCES / f"{plugin}.txt")
     (prefix / "lib").mkdir()
-    (prefix / "lib" / "libbench_talker.so").symlink_to(_BUILT / "libbench_talker.so")
+    library = f"libbench_{plugin}.so"
+    (prefix / "lib" / library).symlink_to(_BUILT / library)
     return prefix
 
 

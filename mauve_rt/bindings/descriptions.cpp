@@ -58,7 +58,8 @@ ResourceDescription describe_resource(const Resource& resource) {
                                   {},
                                   resource.longest_hold_ns(),
                                   resource.refused_values(),
-                                  resource.why_refused_value()};
+                                  resource.why_refused_value(),
+                                  resource.memory_bytes()};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
                                     service->is_call_serializable(), service->messages(),
@@ -235,7 +236,9 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("refused_values", &ResourceDescription::refused_values,
                     "Values with a sequence that had more elements than the capacity.")
       .def_readonly("why_refused_value", &ResourceDescription::why_refused_value,
-                    "The last of them, in words.");
+                    "The last of them, in words.")
+      .def_readonly("memory_bytes", &ResourceDescription::memory_bytes,
+                    "What all values take that it has room for; 0: not known.");
   using E = ExecutionTimeDescription;
   py::class_<E>(module, "ExecutionTimeDescription",
                 "How long an execution state took since its machine was configured.")

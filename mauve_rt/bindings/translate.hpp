@@ -129,6 +129,7 @@ struct ResourceDescription {
   time_ns_t longest_hold_ns;
   std::uint64_t refused_values{0};
   std::string why_refused_value{};
+  std::size_t memory_bytes{0};
 };
 ResourceDescription describe_resource(const Resource& resource);
 

@@ -1,10 +1,10 @@
-"""What `mauve list` prints: what runs, which cores, what is connected; three tables that 80 columns hold."""
+"""What `mauve list` prints: what runs, which cores, what is connected; four tables that 80 columns hold."""
 
 from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
-from rich import box
+from rich import box, filesize
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
@@ -30,7 +30,7 @@ _ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_m
 def print_components(reply: Any, out: Console | None = None) -> None:
     """A ListComponents reply: tables, authors of changes, faults, states that last, what real time lacks."""
     out = out or console()
-    for table in (_components(reply), _cores(reply), _connections(reply)):
+    for table in (_components(reply), _cores(reply), _connections(reply), _memory(reply)):
         if table.row_count:
             out.print(table)
     for name, element, author in _authors(reply):
@@ -150,6 +150,15 @@ def _connections(reply: Any) -> Table:
             connected.add(port.resource)
     for name, names in _lonely(on_ros, connected).items():
         table.add_row("[dim]-[/]", name, names)
+    return table
+
+
+def _memory(reply: Any) -> Table:
+    table = _table("resource", "type")
+    table.add_column("memory", no_wrap=True, justify="right")
+    for resource in reply.resources:
+        if resource.memory_bytes:
+            table.add_row(resource.name, resource.type, filesize.decimal(resource.memory_bytes))
     return table
 
 

@@ -139,6 +139,7 @@ def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, Any]]) 
             type=resource.type,
             author=authors.get(resource.name, {}).get("", ""),
             wait_free=[service.name for service in resource.services if service.is_wait_free],
+            memory_bytes=resource.memory_bytes,
             **bindings.get(resource.name, {}),
         )
         for resource in runtime.described_resources()

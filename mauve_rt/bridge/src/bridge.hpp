@@ -101,7 +101,8 @@ class Bridge {
   std::set<std::string> links_;   // those of which they listen for the silence of the link
   Receiver messages_{node_, "topics_in"};
   Receiver requests_{node_, "requests_in"};  // the resource's own code runs here
-  Receiver events_{node_, "topic_events"};   // few, so that waiting for messages stays cheap
+  // Few, so that waiting for messages stays cheap. Fast DDS wakes who waits for events while a message waits to be taken.
+  Receiver events_{node_, "topic_events", ms_to_ns(100)};
   bool running_{false};
   Atomic<bool> ending_{false};
   Atomic<bool> stops_ending_{false};

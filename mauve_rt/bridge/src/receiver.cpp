@@ -15,7 +15,8 @@ constexpr time_ns_t kIdleEvery = ms_to_ns(5);  // rules tell silence from a rece
 
 }  // namespace
 
-Receiver::Receiver(const rcl_node_t& node, const char* name) : context_(*node.context), name_(name) {
+Receiver::Receiver(const rcl_node_t& node, const char* name, time_ns_t pause_ns)
+    : context_(*node.context), name_(name), pause_ns_(pause_ns) {
   check(rcl_guard_condition_init(&wake_, &context_, rcl_guard_condition_get_default_options()),
         "the bridge cannot receive", "guard condition");
 }
@@ -48,6 +49,7 @@ void Receiver::run() {
     return;
   }
   for (;;) {
+    if (pause_ns_ > 0) pause(set);
     const time_ns_t waited_ns = monotonic_now_ns();  // before the middleware looks
     if (ending_.load(std::memory_order_acquire)) break;
     const Waited waited = after_wait(wait(set), context_);
@@ -69,6 +71,14 @@ time_ns_t Receiver::longest_wait_ns() const {
     if (arrival->wants_idle()) return kIdleEvery;
   }
   return -1;  // for ever
+}
+
+/// Until stop(), or so long.
+void Receiver::pause(rcl_wait_set_t& set) {
+  if (rcl_wait_set_clear(&set) != RCL_RET_OK ||
+      rcl_wait_set_add_guard_condition(&set, &wake_, nullptr) != RCL_RET_OK ||
+      rcl_wait(&set, pause_ns_) != RCL_RET_OK)
+    rcl_reset_error();
 }
 
 rcl_ret_t Receiver::wait(rcl_wait_set_t& set) {

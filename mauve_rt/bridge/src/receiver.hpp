@@ -42,8 +42,9 @@ class Arrival {
 /// | ending_   | stop()                         | the thread | release/acquire; the guard condition wakes after |
 class Receiver {
  public:
-  /// The thread gets the name. Throws Error when rcl refuses. The node outlives the receiver. [non-rt]
-  Receiver(const rcl_node_t& node, const char* name);
+  /// The thread gets the name, and waits for arrivals only after a pause. Throws Error when rcl refuses. The node outlives the
+  /// receiver. [non-rt]
+  Receiver(const rcl_node_t& node, const char* name, time_ns_t pause_ns = 0);
   ~Receiver();
   Receiver(const Receiver&) = delete;
   Receiver& operator=(const Receiver&) = delete;
@@ -55,11 +56,13 @@ class Receiver {
 
  private:
   void run();
+  void pause(rcl_wait_set_t& set);
   rcl_ret_t wait(rcl_wait_set_t& set);
   time_ns_t longest_wait_ns() const;
 
   rcl_context_t& context_;
   const char* name_;
+  time_ns_t pause_ns_;
   rcl_guard_condition_t wake_{rcl_get_zero_initialized_guard_condition()};
   std::vector<Arrival*> arrivals_;
   Atomic<bool> ending_{false};

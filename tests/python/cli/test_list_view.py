@@ -104,6 +104,17 @@ def test_a_port_that_takes_a_lock_is_marked() -> None:
     assert _line(lines, "c.pulse") == ["c.pulse", "pulse.read"]
 
 
+def test_a_resource_has_its_type_and_memory() -> None:
+    resources = [
+        ResourceInfo(name="image", type="sensor_msgs/msg/Image", memory_bytes=24_883_200),
+        ResourceInfo(name="map", type="my_robot/Map"),
+    ]
+    lines = _printed(ListComponents.Response(resources=resources))
+    table = lines[next(i for i, line in enumerate(lines) if "memory" in line) :]
+    assert _line(table, "image") == ["image", "sensor_msgs/msg/Image", "24.9", "MB"]
+    assert not any("map" in line for line in table), "what is not known has no line"
+
+
 @pytest.mark.parametrize("width", [80, 160])
 def test_forty_components_of_long_names_lose_no_word_on_a_narrow_terminal(width: int) -> None:
     name = "localisation_of_the_left_arm_{}"

@@ -153,6 +153,19 @@ def test_the_check_says_what_the_values_take(
         assert f"resource '{name}' takes {bytes_of_resource(resource, registry):,} bytes" in said
 
 
+def test_a_resource_says_what_its_values_take(tmp_path: Path, plugin_prefix: Path) -> None:
+    found = {each.name: each.memory_bytes for each in built(tmp_path, GOOD).resources()}
+    model = load_architecture(tmp_path / "robot.yaml")
+    registry = PluginRegistry()
+    PluginLoader(registry, PluginIndex.installed()).require("core", "executor_tests/JointTurner")
+    one = registry.value_bytes(TYPE, {f"capacity.{path}": size for path, size in FOUR.items()})
+    for name, bytes_found in found.items():
+        assert bytes_found % one == 0
+        assert bytes_found >= bytes_of_resource(model.resources[name], registry)
+    twice = built(tmp_path, GOOD.replace("position: 4", "position: 4000")).resources()
+    assert all(each.memory_bytes > found[each.name] for each in twice)
+
+
 def test_structs_of_two_libraries_for_one_message_are_connected(plugin_prefix: Path) -> None:
     """The resource has the struct of the library that was loaded first, the port that of the other one."""
     registry = PluginRegistry()

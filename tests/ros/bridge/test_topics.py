@@ -258,6 +258,32 @@ def test_missed_deadlines_are_counted(bind: Bind, graph: Any) -> None:
     graph.spin_until(lambda: bound.report("/robot/word").troubles.deadlines_missed > 2, "missed deadlines")
 
 
+def test_who_waits_for_events_is_not_woken_by_messages(bind: Bind, graph: Any) -> None:
+    bound = bind("""\
+  word: {kind: shared_data, type: std_msgs/msg/String, topic: {name: word, direction: subscribe}}
+""")
+    publisher = graph.node.create_publisher(String, "/robot/word", 10)
+
+    def heard(count: int) -> bool:
+        for _ in range(10):
+            publisher.publish(String(data="again"))
+        return bound.report("/robot/word").passed >= count
+
+    graph.spin_until(lambda: heard(1), "a word")
+    [thread] = (
+        task for task in Path("/proc/self/task").iterdir() if "topic_events" in (task / "comm").read_text()
+    )
+
+    def wakes() -> int:
+        lines = (thread / "status").read_text().splitlines()
+        return next(int(line.split()[1]) for line in lines if line.startswith("voluntary_ctxt_switches"))
+
+    before, began_s = wakes(), time.monotonic()
+    graph.spin_until(lambda: heard(500), "500 words")
+    pauses = 10 * (time.monotonic() - began_s)
+    assert wakes() - before <= 4 * pauses + 20
+
+
 def test_another_type_that_comes_to_the_topic_is_told(bind: Bind, graph: Any, domain: int) -> None:
     bound = bind("""\
   word: {kind: shared_data, type: std_msgs/msg/String, topic: {name: word, direction: subscribe}}

@@ -70,6 +70,7 @@ class EventCounter final : public LoggedResource<EventCount, Resource, PiMutex> 
   };
 
   PiMutex& writers() noexcept override { return mutex_; }
+  std::size_t values() const override { return 1; }
 
   EventMessage said_;
   PiMutex mutex_;

@@ -80,6 +80,8 @@ class LatestRegister {
     tables_.push_back(std::move(table));
     table_.store(tables_.back().get(), std::memory_order_release);
   }
+  /// How many values it has memory for. [non-rt] As reserve().
+  std::size_t slots() const noexcept { return slots_.size(); }
   /// How many readers may keep a slot. [rt] As reserve().
   std::size_t room() const MAUVE_RT { return slots_.size() - borrowers_ - 2; }
 

@@ -32,6 +32,9 @@ class LoggedResource : public Base {
       CdrWriter(message).put(written.value);
     });
   }
+  std::size_t memory_bytes() const override {
+    return values() * value_bytes(message_shape<T>(), limits_.capacities());
+  }
   std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
   std::uint64_t refused_values() const noexcept override { return limits_.refused(); }
   std::string why_refused_value() const override { return limits_.refusal(); }
@@ -57,6 +60,8 @@ class LoggedResource : public Base {
  private:
   /// The lock that every writer holds. [rt]
   virtual Lock& writers() MAUVE_RT = 0;
+  /// How many values it has memory for, without the log. [non-rt]
+  virtual std::size_t values() const = 0;
 
   SequenceLimits<T> limits_;
   WriteLog<WrittenValue<T>> log_;  // under writers()

@@ -33,7 +33,7 @@ struct PortLimits {
 /// | register_ | the serialized face, rules, readers without a port: as one more reader | others_mutex_                |
 /// | register_ | who writes                                             | write.mutex(), biased to the only port       |
 /// | seats_    | ports that come and go                                 | relaxed: a count, nothing depends on its order |
-/// | register_.reserve() | who prepares a connection                    | room_mutex_                                  |
+/// | register_.reserve(), slots() | who prepares or describes           | room_mutex_                                  |
 /// | limits_   | any                                                    | its own                                      |
 template <Described T>
 class NewestValue : public LoggedResource<T, NewestResource> {
@@ -106,6 +106,10 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   friend class BiasedWrite<T, NewestValue>;
 
   BiasedMutex& writers() noexcept override { return write.mutex(); }
+  std::size_t values() const override {
+    const LockGuard lock(room_mutex_);
+    return register_.slots();
+  }
 
   bool take(const T& value, time_ns_t time_ns) noexcept {
     if (!register_.write(value, time_ns)) return false;
@@ -171,7 +175,7 @@ class NewestValue : public LoggedResource<T, NewestResource> {
   PortLimits limits_;
   LatestRegister<T> register_;
   PiMutex others_mutex_;
-  Mutex room_mutex_;
+  mutable Mutex room_mutex_;
   Atomic<std::uint32_t> room_{static_cast<std::uint32_t>(register_.room() - kOthers)};
   Atomic<std::uint32_t> seats_{0};
 

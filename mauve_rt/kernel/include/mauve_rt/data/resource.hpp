@@ -206,6 +206,8 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   virtual bool next_write(std::vector<std::byte>& /*message*/, time_ns_t& /*time*/) { return false; }
   /// Writes that found no room there. [rt]
   virtual std::uint64_t lost_writes() const MAUVE_RT { return 0; }
+  /// What its values take, all those that it has room for; 0: not known. [non-rt]
+  virtual std::size_t memory_bytes() const { return 0; }
   /// Values that a write or a read refused, as a sequence had more elements than the capacity. [rt]
   virtual std::uint64_t refused_values() const MAUVE_RT { return 0; }
   /// Why the last of them was, in words; empty: none was. [non-rt]

@@ -184,6 +184,13 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   friend class BiasedWrite<T, RingBuffer>;
 
   BiasedMutex& writers() noexcept override { return write.mutex(); }
+  std::size_t values() const override {
+    if constexpr (kIsLarge<T>) {
+      const LockGuard lock(room_mutex_);
+      return blocks_.size();
+    }
+    return places_.size();
+  }
   bool overwrites() const noexcept { return when_full_ == WhenFull::overwrite; }
 
   BiasedMutex& readers_mutex() noexcept { return overwrites() ? write.mutex() : readers_mutex_; }
@@ -329,7 +336,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   Readers readers_;
   std::vector<Place> places_;
   WhenFull when_full_;
-  Mutex room_mutex_;
+  mutable Mutex room_mutex_;
   std::vector<std::unique_ptr<T>> blocks_;  // of large elements: of the places, and spare ones of each end
   alignas(kCacheLine) BiasedMutex readers_mutex_;
 
