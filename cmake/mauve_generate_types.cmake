@@ -3,7 +3,7 @@
 # Writes C++ structs for ROS messages, services and actions, and adds the interface library <target>, which has them.
 #
 #   <interfaces>   PACKAGE/msg/NAME, PACKAGE/srv/NAME, PACKAGE/action/NAME, or PACKAGE for all it has: of installed packages, or of
-#                  this one after rosidl_generate_interfaces(). Nested messages come with them.
+#                  a project of this build after its rosidl_generate_interfaces(). Nested messages come with them.
 #
 # `#include <mauve_types/sensor_msgs/msg/imu.hpp>` then has the struct mauve::msg::sensor_msgs::Imu.
 function(mauve_generate_types target)
@@ -14,11 +14,19 @@ function(mauve_generate_types target)
   set(program "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/mauve_generate_types.py")
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/mauve_types/include")
   file(TO_CMAKE_PATH "$ENV{AMENT_PREFIX_PATH}" prefixes)
+  list(TRANSFORM ARGN REPLACE "/.*" "" OUTPUT_VARIABLE packages)
+  list(REMOVE_DUPLICATES packages)
+  set(of_this_build "")
+  foreach(package IN LISTS packages)
+    if(DEFINED ${package}_BINARY_DIR) # as project() sets it
+      list(APPEND of_this_build
+        --package ${package} "${${package}_BINARY_DIR}/rosidl_adapter/${package}" "${${package}_SOURCE_DIR}")
+    endif()
+  endforeach()
   execute_process(
     COMMAND "${Python3_EXECUTABLE}" "${program}" --target ${target} --output "${folder}"
             --prefixes ${prefixes} ${CMAKE_PREFIX_PATH}
-            --package ${PROJECT_NAME} "${PROJECT_BINARY_DIR}/rosidl_adapter/${PROJECT_NAME}" "${PROJECT_SOURCE_DIR}"
-            --interfaces ${ARGN}
+            ${of_this_build} --interfaces ${ARGN}
     OUTPUT_VARIABLE read ERROR_VARIABLE error RESULT_VARIABLE result OUTPUT_STRIP_TRAILING_WHITESPACE)
   if(NOT result EQUAL 0)
     message(FATAL_ERROR "mauve_generate_types(${target}): ${error}")

@@ -1,7 +1,7 @@
 """Write C++ structs for ROS interfaces, as CMake's mauve_generate_types() asks for them.
 
     mauve_generate_types.py --target NAME --output FOLDER --prefixes FOLDER...
-                            [--package NAME FOLDER...] --interfaces NAME...
+                            [--package NAME FOLDER...]... --interfaces NAME...
 
 An interface is PACKAGE/msg/NAME, PACKAGE/srv/NAME, PACKAGE/action/NAME, or PACKAGE for all that the package
 has. Nested messages are written, too. Prints the .idl files that were read. Writes only files that change.
@@ -13,7 +13,7 @@ import json
 import re
 import sys
 from ast import literal_eval
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -77,12 +77,11 @@ class Interface:
 
 
 class Installed:
-    """The .idl files of prefixes, and of the package that is being built."""
+    """The .idl files of prefixes, and of packages that are being built, by their names."""
 
-    def __init__(self, prefixes: Sequence[Path], package: str, folders: Sequence[Path]) -> None:
+    def __init__(self, prefixes: Sequence[Path], built: Mapping[str, Sequence[Path]]) -> None:
         self._prefixes = prefixes
-        self._package = package
-        self._folders = folders
+        self._built = built
 
     def packages(self) -> set[str]:
         """List the installed packages with interfaces."""
@@ -91,7 +90,7 @@ class Installed:
 
     def of_package(self, package: str) -> dict[Interface, Path]:
         """Each interface of a package, with the folder that has msg/NAME.idl."""
-        own = self._folders if package == self._package else ()
+        own = self._built.get(package, ())
         found: dict[Interface, Path] = {}
         for folder in (*own, *(prefix / "share" / package for prefix in self._prefixes)):
             for kind in KINDS:
@@ -434,12 +433,12 @@ def main() -> int:
     parser.add_argument("--target", required=True)
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--prefixes", nargs="*", type=Path, default=[])
-    parser.add_argument("--package", nargs="*", default=[""])
+    parser.add_argument("--package", nargs="+", action="append", default=[])
     parser.add_argument("--interfaces", nargs="+", required=True)
     given = parser.parse_args()
 
-    package, *folders = given.package
-    installed = Installed(given.prefixes, package, [Path(folder) for folder in folders])
+    built = {name: [Path(folder) for folder in folders] for name, *folders in given.package}
+    installed = Installed(given.prefixes, built)
     try:
         read = update(installed, given.target, given.output, given.interfaces)
     except Refusal as refusal:

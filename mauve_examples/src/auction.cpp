@@ -85,11 +85,11 @@ std::optional<std::size_t> bid_together(const FrontierList& own, const PeerTable
   for (const Frontier& frontier : own) bidders[0].offers.push_back({frontier.at, frontier.cost_m});
   for (const Peer& peer : peers.peers()) {
     if (peer.has_claim)
-      taken.push_back({{peer.claim.x, peer.claim.y, 0.0}, options.undercut_share * peer.claim.cost_m});
+      taken.push_back({{peer.claim.x, peer.claim.y, 0.0}, options.undercut_share * peer.claim.cost});
     if (peer.has_claim || !peer.bidding) continue;
     Bidder& bidder = bidders[count++];
     bidder.name = peer.name.view();
-    for (const Bid& bid : peer.bids) bidder.offers.push_back({{bid.x, bid.y, 0.0}, bid.cost_m});
+    for (const Bid& bid : peer.bids) bidder.offers.push_back({{bid.x, bid.y, 0.0}, bid.cost});
   }
   for (std::size_t round = 0; round < count; ++round) {
     const Winner winner = lowest(std::span(bidders.data(), count), taken, options);
@@ -104,7 +104,7 @@ std::optional<std::size_t> bid_together(const FrontierList& own, const PeerTable
 bool is_undercut(const Bid& own, const PeerTable& peers, const AuctionOptions& options) noexcept {
   return std::any_of(peers.peers().begin(), peers.peers().end(), [&](const Peer& peer) {
     return peer.has_claim && distance_m(own, peer.claim) < options.claim_radius_m &&
-           peer.claim.cost_m < options.undercut_share * own.cost_m;
+           peer.claim.cost < options.undercut_share * own.cost_m;
   });
 }
 

@@ -43,8 +43,8 @@ void Explorer::receive(const PeerMessage& message) noexcept {
   Peer& peer = *peers_.find(message.sender.view());
   if (message.map_batch == 0 || message.map_batch == peer.merged_batch) return;
   const GridGeometry& grid = geometry();
-  const bool same_grid = message.resolution_m == grid.resolution_m && message.origin_x_m == grid.origin_x_m &&
-                         message.origin_y_m == grid.origin_y_m;
+  const bool same_grid = message.resolution == grid.resolution_m && message.origin_x == grid.origin_x_m &&
+                         message.origin_y == grid.origin_y_m;
   // Tiles of another grid mean nothing here, but its sender shall not wait for them for ever.
   peer.merged_batch = message.map_batch;
   if (!same_grid) return;
@@ -124,9 +124,9 @@ void Explorer::compose(PeerMessage& message) noexcept {
   message.x = robot_.x;
   message.y = robot_.y;
   message.map_batch = sender_.batch();
-  message.resolution_m = geometry().resolution_m;
-  message.origin_x_m = geometry().origin_x_m;
-  message.origin_y_m = geometry().origin_y_m;
+  message.resolution = geometry().resolution_m;
+  message.origin_x = geometry().origin_x_m;
+  message.origin_y = geometry().origin_y_m;
   message.tiles.clear();
   message.map_runs = sender_.runs();
 }

@@ -14,9 +14,9 @@ bool MappingCore::configure_hook() {
   });
   scan_ = std::make_unique<Scan>();
   update_ = std::make_unique<MapUpdate>();
-  update_->resolution_m = world.resolution_m;
-  update_->origin_x_m = world.origin_x_m;
-  update_->origin_y_m = world.origin_y_m;
+  update_->resolution = world.resolution_m;
+  update_->origin_x = world.origin_x_m;
+  update_->origin_y = world.origin_y_m;
   update_->columns = static_cast<std::uint16_t>(world.tile_columns());
   update_->rows = static_cast<std::uint16_t>(world.tile_rows());
   changes_.configure(world.tile_count());

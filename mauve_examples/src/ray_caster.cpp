@@ -50,8 +50,8 @@ void scan_robots(std::span<const RobotBody> robots, const Pose2D& pose, Scan& sc
   for (const RobotBody& robot : robots) {
     const double x_m = robot.x - pose.x;
     const double y_m = robot.y - pose.y;
-    const double beyond = x_m * x_m + y_m * y_m - robot.radius_m * robot.radius_m;
-    const double reach_m = static_cast<double>(scan.max_range_m) + robot.radius_m;
+    const double beyond = x_m * x_m + y_m * y_m - robot.radius * robot.radius;
+    const double reach_m = static_cast<double>(scan.max_range_m) + robot.radius;
     if (x_m * x_m + y_m * y_m > reach_m * reach_m) continue;
     for (std::size_t i = 0; i < kBeamCount; ++i) {
       const Direction beam = beams.direction(i, heading);

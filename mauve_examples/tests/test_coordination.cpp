@@ -321,7 +321,7 @@ TEST_F(Rounds, NoGoalIsTakenBeforeThePeerHasAnswered) {
   EXPECT_NEAR(explorer_.destination().x, 5.05, 0.1);  // the nearer end
   EXPECT_EQ(compose().round, 0U);
   EXPECT_TRUE(message_->has_claim);
-  EXPECT_NEAR(message_->claim.cost_m, 2.0, 0.5);
+  EXPECT_NEAR(message_->claim.cost, 2.0, 0.5);
 }
 
 TEST_F(Rounds, TwoOpenRoundsAnswerEachOther) {
