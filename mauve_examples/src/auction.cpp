@@ -104,7 +104,7 @@ std::optional<std::size_t> bid_together(const FrontierList& own, const PeerTable
 bool is_undercut(const Bid& own, const PeerTable& peers, const AuctionOptions& options) noexcept {
   return std::any_of(peers.peers().begin(), peers.peers().end(), [&](const Peer& peer) {
     return peer.has_claim && distance_m(own, peer.claim) < options.claim_radius_m &&
-           peer.claim.cost < options.undercut_share * own.cost_m;
+           peer.claim.cost < options.undercut_share * own.cost;
   });
 }
 

@@ -10,6 +10,7 @@
 #include "mauve_rt/data/bounded.hpp"
 #include "mauve_rt/data/cdr.hpp"
 #include "mauve_rt/elements/types.hpp"
+
 #include "mauve_types/mauve_msgs/msg/map_update.hpp"
 #include "mauve_types/mauve_msgs/msg/peer_message.hpp"
 #include "mauve_types/mauve_msgs/msg/robot_body.hpp"
