@@ -284,6 +284,27 @@ TYPED_TEST(WithSequences, AreKeptInTheLog) {
   EXPECT_THAT(value->ranges.view(), ::testing::ElementsAre(1, 1, 1));
 }
 
+TYPED_TEST(WithSequences, ALookShowsTheNewestValueWhoeverHasReadIt) {
+  std::vector<std::byte> message;
+  time_ns_t time_ns = 0;
+  std::uint64_t sequence = 7;
+  const auto look = [&] {
+    const auto value = SequenceLimits<Scan>(Capacities{{"ranges", kCapacity}}).make();
+    const bool is_there = this->resource->peek_sample(message, time_ns, sequence);
+    EXPECT_TRUE(CdrReader(message).get(*value));
+    EXPECT_EQ(is_there, sequence != 0);
+    return value->number;
+  };
+  EXPECT_EQ(0, look());
+  for (int i = 1; i <= 20; ++i) {
+    ASSERT_TRUE(this->write(i, 2));
+    EXPECT_EQ(i, look());
+    this->reader.with([](const Scan&) {});
+    EXPECT_EQ(i, look());
+    EXPECT_EQ(static_cast<std::uint64_t>(i), sequence);
+  }
+}
+
 TYPED_TEST(WithSequences, GoBetweenStructsOfOneLayoutAndBetweenNoOthers) {
   ReadPort<elsewhere::Scan> equal("equal");
   equal.connect(this->resource->read, "scan");
@@ -332,7 +353,20 @@ TYPED_TEST(WithSequences, AreWholeBesideOtherWritersAndReaders) {
       }
     }
   };
+  const auto look = [&] {
+    const auto value = SequenceLimits<Scan>(Capacities{{"ranges", kCapacity}}).make();
+    std::vector<std::byte> message;
+    time_ns_t time_ns = 0;
+    std::uint64_t sequence = 0;
+    while (!done) {
+      if (!this->resource->peek_sample(message, time_ns, sequence)) continue;
+      ASSERT_TRUE(CdrReader(message).get(*value));
+      for (const double range : value->ranges) ASSERT_EQ(value->number, range);
+      std::this_thread::yield();
+    }
+  };
   std::vector<std::thread> threads;
+  threads.emplace_back(look);
   threads.emplace_back([&] { read(this->reader); });
   threads.emplace_back([&] { read(other); });
   std::thread writer([&] { write(second); });

@@ -31,12 +31,14 @@ enum class WhenFull : std::uint8_t { refuse, overwrite };
 /// for both ends, without a bias: its writer removes elements too. tests/models/loom explores the queue and its biased mutex.
 ///
 /// Large elements lie in blocks, and a place has the address of one: a writer fills a spare block and exchanges it for that of the
-/// place, a reader takes the place's block for a spare one. So a port copies nothing under a lock.
+/// place, a reader takes the place's block for a spare one. So a port copies nothing under a lock. The newest element stays in its
+/// block, wherever that goes, until a writer fills it again: who looks at it keeps it from the writers meanwhile.
 ///
 /// | member            | written by | read by    | under / order                                                    |
 /// | ----------------- | ---------- | ---------- | ---------------------------------------------------------------- |
 /// | places_           | writers    | readers    | a place between head_ and tail_ is its reader's, else its writer's |
 /// | spare blocks      | each end   | each end   | the mutex of that end; blocks_: who prepares a connection, room_mutex_ |
+/// | newest, looked_at | writers, who looks | the same | write.mutex(); one looks at a time: looker_mutex_         |
 /// | Writers::tail     | writers    | readers    | write.mutex(); release / acquire: publishes the place           |
 /// | Readers::head     | readers    | writers    | readers_mutex_; release / acquire: the place may be filled again |
 /// | the rest of both  | the same   | the same   | that mutex                                                       |
@@ -56,8 +58,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     if (overwrites()) write.mutex().share();
     if constexpr (kIsLarge<T>) {
       for (Place& place : places_) place.value = new_block();
-      add_spares(writers_.spares, write.mutex(), kOtherUsers);
-      add_spares(readers_.spares, readers_mutex(), kOtherUsers);
+      add_spares(writers_.spares, write.mutex(), kOtherWriters);
+      add_spares(readers_.spares, readers_mutex(), kOtherReaders);
     }
     this->offer(read);
     this->offer(write);
@@ -93,6 +95,13 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   }
   /// The element written last; a reader may have removed it.
   bool peek_sample(std::vector<std::byte>& message, time_ns_t& time_ns, std::uint64_t& sequence) override {
+    if constexpr (kIsLarge<T>) {  // without a copy
+      const LockGuard one_at_a_time(looker_mutex_);
+      const T* const newest = begin_look(time_ns, sequence);
+      CdrWriter(message).put(newest != nullptr ? *newest : *read.make());
+      end_look();
+      return newest != nullptr;
+    }
     const auto value = read.make();
     {
       const LockGuard lock(write.mutex());
@@ -117,7 +126,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
  private:
   static constexpr std::size_t kCacheLine = 64;
 
-  static constexpr std::size_t kOtherUsers = 2;  // of an end: a topic, and who looks at messages
+  static constexpr std::size_t kOtherReaders = 2;  // a topic, and who takes messages by hand
+  static constexpr std::size_t kOtherWriters = 3;  // the same, and the block that somebody looks at
   using Block = std::conditional_t<kIsLarge<T>, T*, T>;
   using Spares = std::vector<T*>;
 
@@ -140,6 +150,10 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     std::size_t place{0};           // of the next element
     Atomic<std::uint64_t> lost{0};
     Spares spares;
+    T* newest{nullptr};  // of large elements: the block with the last one
+    time_ns_t newest_ns{0};
+    const T* looked_at{nullptr};  // the block that is not filled again now
+    bool is_kept{false};          // whether it came back meanwhile
   };
   struct alignas(kCacheLine) Readers {
     Atomic<std::uint64_t> head{0};  // elements removed so far
@@ -175,7 +189,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     std::unique_ptr<T> make() const override { return owner_.limits().make(); }
     bool is_whole(const T& value) noexcept override { return owner_.limits().admits(value); }
     void make_room(std::uint32_t ports) override {
-      if constexpr (kIsLarge<T>) owner_.make_spares(owner_.readers_.spares, owner_.readers_mutex(), ports);
+      if constexpr (kIsLarge<T>) owner_.make_spares(owner_.readers_.spares, owner_.readers_mutex(), ports + kOtherReaders);
     }
 
    private:
@@ -261,6 +275,10 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     return place;
   }
   void give_back(T& place) noexcept {
+    if (&place == writers_.looked_at) {
+      writers_.is_kept = true;  // until end_look()
+      return;
+    }
     MAUVE_RT_TRUSTED(writers_.spares.push_back(&place));  // within its capacity: add_spares()
   }
   bool publish(T& value, time_ns_t time_ns) noexcept {
@@ -269,21 +287,26 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     if (is_taken) {
       this->log(value, time_ns);
       std::swap(places_[writers_.place].value, block);
+      writers_.newest = &value;
+      writers_.newest_ns = time_ns;
       add(time_ns);
     }
     give_back(*block);
     return is_taken;
   }
   bool take(const T& value, time_ns_t time_ns) noexcept {
-    if (!has_room()) return false;
     if constexpr (kIsLarge<T>) {
-      *places_[writers_.place].value = value;
+      T* const place = borrow();
+      if (place == nullptr) return false;
+      *place = value;
+      return publish(*place, time_ns);
     } else {
+      if (!has_room()) return false;
       places_[writers_.place].value = value;
+      this->log(value, time_ns);
+      add(time_ns);
+      return true;
     }
-    this->log(value, time_ns);
-    add(time_ns);
-    return true;
   }
   bool has_room() noexcept {
     const std::uint64_t tail =
@@ -307,12 +330,25 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     writers_.tail.store(tail + 1, std::memory_order_release);
   }
 
+  /// The newest element, which no writer touches until end_look(); nullptr: there was none. [non-rt]
+  const T* begin_look(time_ns_t& time_ns, std::uint64_t& sequence) {
+    const LockGuard no_writer(write.mutex());
+    time_ns = writers_.newest_ns;
+    sequence = writers_.tail.load(std::memory_order_relaxed);  // relaxed: written under this lock
+    return writers_.looked_at = writers_.newest;
+  }
+  void end_look() {
+    const LockGuard no_writer(write.mutex());
+    const T* const block = std::exchange(writers_.looked_at, nullptr);
+    if (std::exchange(writers_.is_kept, false)) give_back(*const_cast<T*>(block));
+  }
+
   T* new_block() {
     blocks_.push_back(this->limits().make());
     return blocks_.back().get();
   }
-  /// For an end that so many ports use. [non-rt]
-  void make_spares(Spares& spares, BiasedMutex& mutex, std::size_t ports) {
+  /// For an end with so many users. [non-rt]
+  void make_spares(Spares& spares, BiasedMutex& mutex, std::size_t users) {
     const LockGuard lock(room_mutex_);
     std::size_t spare = 0;
     {
@@ -320,7 +356,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
       spare = spares.size();
     }
     // What is lent now may be of one that was left behind in a state that hangs.
-    if (spare < ports + kOtherUsers) add_spares(spares, mutex, ports + kOtherUsers - spare);
+    if (spare < users) add_spares(spares, mutex, users - spare);
   }
   void add_spares(Spares& spares, BiasedMutex& mutex, std::size_t count) {
     Spares more;
@@ -330,13 +366,16 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     more.insert(more.end(), spares.begin(), spares.end());
     spares.swap(more);
   }
-  void make_room_to_write(std::uint32_t ports) { make_spares(writers_.spares, write.mutex(), ports); }
+  void make_room_to_write(std::uint32_t ports) {
+    make_spares(writers_.spares, write.mutex(), ports + kOtherWriters);
+  }
 
   Writers writers_;
   Readers readers_;
   std::vector<Place> places_;
   WhenFull when_full_;
   mutable Mutex room_mutex_;
+  Mutex looker_mutex_;
   std::vector<std::unique_ptr<T>> blocks_;  // of large elements: of the places, and spare ones of each end
   alignas(kCacheLine) BiasedMutex readers_mutex_;
 
