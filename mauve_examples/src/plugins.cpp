@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// What this library offers by name; plugins.txt lists it for the ament index.
+// What this library offers by name.
 #include "mauve_examples/control.hpp"
 #include "mauve_examples/exploration.hpp"
 #include "mauve_examples/guidance.hpp"

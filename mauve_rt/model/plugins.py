@@ -36,6 +36,7 @@ KINDS: Mapping[str, str] = {
 }
 IN_PYTHON = ("shell", "core", "fsm", "resource")
 """Kinds that a Python class can be; types are written in C++, or are ROS messages, which nothing lists."""
+_TYPES = ("type", "call_type")  # several packages may register the same one
 SOURCE_IT = "source its install/setup.bash, or add its prefix to AMENT_PREFIX_PATH"
 _FIELDS = 4
 
@@ -143,7 +144,8 @@ class PluginIndex:
 
 
 def _index_files() -> _Files:
-    resources = ament_index.resources(INDEX_RESOURCE)
+    """MAUVE RT's own first: common types are loaded from there, not from a package that has them as well."""
+    resources = sorted(ament_index.resources(INDEX_RESOURCE), key=lambda each: each[0] != "mauve_rt")
     return [(prefix, file, Stamp.of(file)) for _, prefix, file in resources]
 
 
@@ -184,7 +186,9 @@ class PluginLoader:
                 is another one on the disk by now.
         """
         plugin = self.index.find(kind, name)
-        source = self._sources.get((kind, name), "") if plugin is None else plugin.source
+        source = self._sources.get((kind, name), "")
+        if plugin is not None and kind not in _TYPES:  # a type may be of another library than the index's first
+            source = plugin.source
         if change := self._loaded.change_of(source):
             raise PluginError(f"{kind} '{name}': {change}", element=name, remedy=REMEDY)
         if name in self.registry.names(kind):
