@@ -59,6 +59,7 @@ function(_mauve_write_messages)
 
   _mauve_digest(digest "${CMAKE_CXX_COMPILER} ${CMAKE_CXX_FLAGS} ${arg_LIBRARIES}" "${program}" ${_MAUVE_MESSAGES_READ})
   if(NOT digest STREQUAL "${_MAUVE_MESSAGES_DIGEST}")
+    message(STATUS "Making messages of ${arg_STRUCTS}")
     try_run(ran compiled "${folder}/program" "${program}"
       CMAKE_FLAGS "-DINCLUDE_DIRECTORIES=${CMAKE_CURRENT_SOURCE_DIR}/include;${CMAKE_CURRENT_BINARY_DIR}/mauve_types/include"
       COMPILE_DEFINITIONS -H # prints which files are included

@@ -84,10 +84,8 @@ def prefix(tmp_path_factory: pytest.TempPathFactory, plugin_prefix: Path) -> Ite
         for name, path in paths.items():
             patch.setenv(name, os.pathsep.join([str(path), os.environ.get(name, "")]))
         patch.syspath_prepend(str(modules))
-        for kind in (
-            "fastrtps",
-            "introspection",
-        ):  # found by name: this process read LD_LIBRARY_PATH at its start
+        # Found by name: this process read LD_LIBRARY_PATH at its start.
+        for kind in ("fastrtps", "introspection"):
             ctypes.CDLL(str(prefix / f"lib/libmauve_downstream__rosidl_typesupport_{kind}_c.so"))
         yield prefix
 
@@ -188,9 +186,8 @@ def test_the_struct_is_on_a_topic_and_in_a_bag(
         [connection] = [each for each in reader.connections if each.topic == "/leg"]
         assert connection.msgtype == "mauve_downstream/msg/Leg"
         assert connection.msgdef.data.startswith(LEG_FILE)
-        recorded = [
-            reader.deserialize(data, connection.msgtype) for _, _, data in reader.messages([connection])
-        ]
+        messages = [data for _, _, data in reader.messages([connection])]
+        recorded = [reader.deserialize(data, connection.msgtype) for data in messages]
     assert recorded[0].foot.x == 1.0
     for leg in recorded[:3]:
         assert_walked(leg)
