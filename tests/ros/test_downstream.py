@@ -1,6 +1,7 @@
 """A package of its own, tests/downstream: messages as its structs, and its structs as messages."""
 
 import ctypes
+import importlib
 import os
 import subprocess
 import sys
@@ -93,9 +94,7 @@ def prefix(tmp_path_factory: pytest.TempPathFactory, plugin_prefix: Path) -> Ite
 @pytest.fixture
 def msg(prefix: Path) -> ModuleType:
     """The classes of the package's messages."""
-    import mauve_downstream.msg  # noqa: PLC0415 - it has just been built
-
-    return mauve_downstream.msg
+    return importlib.import_module("mauve_downstream.msg")
 
 
 @pytest.fixture
