@@ -26,6 +26,8 @@ struct Lower { double value{}; };
 struct Capital { double Value{}; };
 struct Twice { double value__x{}; };
 struct Wide { long double value{}; };
+struct Row { std::array<mauve::BoundedVector<double, 2>, 3> rows; };
+struct Table { std::array<Row, 2> rows; };
 struct Copy { double copied{}; };
 struct Foreign { double value{}; };
 struct Gone { Foreign foreign; };
@@ -37,6 +39,8 @@ MAUVE_TYPE(odd::Lower, "odd/msg/lower", value)
 MAUVE_TYPE(odd::Capital, "odd/msg/Capital", Value)
 MAUVE_TYPE(odd::Twice, "odd/msg/Twice", value__x)
 MAUVE_TYPE(odd::Wide, "odd/msg/Wide", value)
+MAUVE_TYPE(odd::Row, "odd/msg/Row", rows)
+MAUVE_TYPE(odd::Table, "odd/msg/Table", rows)
 MAUVE_TYPE(odd::Copy, "odd/msg/Good", copied)
 MAUVE_TYPE(odd::Foreign, "geometry_msgs/msg/Foreign", value)
 MAUVE_TYPE(odd::Gone, "odd/msg/Gone", foreign)
@@ -118,6 +122,10 @@ REFUSED = {
     "long double": (
         "HEADERS include/odd.hpp STRUCTS odd::Wide",
         "field 'value' of odd/msg/Wide: long double has no type in ROS messages. Use double.",
+    ),
+    "list of lists": (
+        "HEADERS include/odd.hpp STRUCTS odd::Table",
+        "struct odd::Table: a list of lists has no type in ROS messages. Put the inner list into a struct.",
     ),
     "one name": (
         "HEADERS include/odd.hpp STRUCTS odd::Good odd::Copy",
