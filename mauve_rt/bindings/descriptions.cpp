@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/data/message_file.hpp"
+
 #include "translate.hpp"
 
 namespace mauve::bindings {
@@ -170,6 +172,12 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("type", &MessageShape::type)
       .def_readonly("bytes", &MessageShape::bytes, "Of the struct.")
       .def_readonly("fields", &MessageShape::fields);
+  py::class_<MessageFile>(module, "MessageFile", "The .msg file of a struct.")
+      .def_readonly("name", &MessageFile::name, "Of the message: package/msg/Name.")
+      .def_readonly("text", &MessageFile::text);
+  module.def("message_files", &message_files,
+             "The .msg file of a struct, then those of the structs within it, each once.");
+  module.def("message_name", &message_name, "Of a struct of this type: package/msg/Name.");
   py::class_<PortDescription>(module, "PortDescription")
       .def_readonly("name", &PortDescription::name)
       .def_readonly("kind", &PortDescription::kind, "'read', 'write', 'call', 'event'.")

@@ -39,10 +39,9 @@ class _Words(argparse.Action):
 
 def main(args: argparse.Namespace) -> int:
     """Show one type, or all."""
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415 - other verbs need not load it
+    from mauve_rt._kernel import PluginRegistry, message_files  # noqa: PLC0415 - other verbs need not load it
     from mauve_rt.cli.views import print_json  # noqa: PLC0415
     from mauve_rt.model import PluginIndex  # noqa: PLC0415
-    from mauve_rt.model.message_text import message_file  # noqa: PLC0415
     from mauve_rt.model.plugins import PluginLoader  # noqa: PLC0415
 
     loader = PluginLoader(PluginRegistry(), PluginIndex.installed())
@@ -53,7 +52,7 @@ def main(args: argparse.Namespace) -> int:
     loader.require("type", args.type)
     shape = next(each for each in loader.registry.type_shapes() if each.type == args.type)
     if args.is_file:
-        print(message_file(shape), end="")
+        print(message_files(shape)[0].text, end="")
     elif args.json:
         print_json({**_row(loader, shape), "fields": [*_fields(shape.fields)]})
     else:

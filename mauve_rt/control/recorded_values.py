@@ -3,11 +3,10 @@
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from mauve_rt._kernel import ValueLog
+from mauve_rt._kernel import ValueLog, message_name
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.values import Values, definition_of
 from mauve_rt.errors import MauveError
-from mauve_rt.model.message_text import message_name
 from mauve_rt.trace.bag.recorded import SentMessage
 
 
