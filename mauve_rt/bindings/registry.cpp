@@ -250,6 +250,20 @@ Its actions run on the component's thread under the interpreter's lock.)")
           },
           py::arg("name"))
       .def(
+          "describe_fsm",
+          [](const PluginRegistry& self, const std::string& name) {
+            const InterpreterUnlocked release;
+            const auto shell = self.make_shell(self.fsm_shell(name));
+            const auto fsm = self.make_fsm(name);
+            if (!fsm->bind_shell(*shell)) {
+              throw Error(ErrorCode::type_mismatch, "the fsm does not run its shell",
+                          {.element = fsm->description(), .found = shell->implementation()});
+            }
+            fsm->configure();
+            return fsm->describe_states();
+          },
+          py::arg("name"), "Its states, with the shell's properties as they are unless set.")
+      .def(
           "describe_resource",
           [](const PluginRegistry& self, const std::string& kind, const std::string& type) {
             const ResourceParameters needed =

@@ -12,6 +12,7 @@ from mauve_rt.cli import (
     dev_verb,
     echo_verb,
     mirror_verb,
+    plugins_verb,
     report_verb,
     rules_verb,
     shadow_verb,
@@ -382,30 +383,6 @@ def _events(args: argparse.Namespace) -> int:
     return OK
 
 
-def _plugins(args: argparse.Namespace) -> int:
-    from mauve_rt.cli.views import console, print_json  # noqa: PLC0415
-    from mauve_rt.model import PluginIndex  # noqa: PLC0415
-
-    index = PluginIndex.installed()
-    rows = sorted(
-        (plugin.kind, plugin.name, plugin.shell, plugin.target, str(plugin.prefix)) for plugin in index
-    )
-    fields = ("kind", "name", "shell", "target", "prefix")
-    if args.json:
-        print_json([dict(zip(fields, row, strict=True)) for row in rows])
-    else:
-        from rich import box  # noqa: PLC0415 - takes its time to load
-        from rich.table import Table  # noqa: PLC0415
-
-        table = Table(*fields[:4], box=box.SIMPLE_HEAD, pad_edge=False)
-        for row in rows:
-            table.add_row(*row[:4])
-        console().print(table)
-    for complaint in index.complaints:
-        print(one_line(complaint), file=sys.stderr)
-    return OK
-
-
 def _add_recording(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(title="actions", metavar="start|stop", required=True)
     start = actions.add_parser("start", help="start a recording into a new bag")
@@ -541,7 +518,12 @@ VERBS = (
         trace_verb.add_arguments,
         trace_verb.main,
     ),
-    Verb("plugins", "show the installed shells, cores, fsms, resources and types", _add_json, _plugins),
+    Verb(
+        "plugins",
+        "show the installed shells, cores, fsms, resources and types, or all of one",
+        plugins_verb.add_arguments,
+        plugins_verb.main,
+    ),
     Verb(
         "types",
         "show the types of data that plug-ins register, and write them as .msg files",

@@ -179,3 +179,31 @@ def test_module_runs_as_a_program() -> None:
         [sys.executable, "-m", "mauve_rt.cli", "--version"], capture_output=True, check=True
     )
     assert done.stdout.strip()
+
+
+def test_a_part_has_its_ports_properties_and_states(
+    plugin_prefix: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["plugins", "mauve_rt/TwistRelayFsm", "--json"]) == 0
+    [fsm] = json.loads(capsys.readouterr().out)
+    assert (fsm["kind"], fsm["shell"]) == ("fsm", "mauve_rt/TwistRelayShell")
+    ports = [(port["name"], port["kind"], port["type"], port["required"]) for port in fsm["ports"]]
+    assert ports == [
+        ("input", "read", "geometry_msgs/msg/Twist", True),
+        ("output", "write", "geometry_msgs/msg/Twist", True),
+    ]
+    period = next(each for each in fsm["properties"] if each["name"] == "period_us")
+    assert (period["default"], period["unit"], period["minimum"]) == (10_000, "us", 1)
+    assert period["read once by"] == ["fsm"]
+    states = {state["name"]: state for state in fsm["states"]}
+    assert states["Update"]["kind"] == "execution"
+    assert (states["AwaitUpdate"]["kind"], states["AwaitUpdate"]["duration_ns"]) == ("wait", 10_000_000)
+    assert states["AwaitUpdate"]["next"] == ["Update"]
+    assert main(["plugins", "executor_tests/PyCounter"]) == 0
+    said = capsys.readouterr().out
+    assert "core executor_tests/PyCounter, shell executor_tests/CounterShell" in said
+    assert "period_ms" in said
+    assert main(["plugins", "sensor_msgs/msg/JointState"]) == 0
+    assert "lists that need a capacity: name, position, velocity, effort" in capsys.readouterr().out
+    assert main(["plugins", "executor_tests/PyCouter"]) != 0
+    assert "executor_tests/PyCounter" in capsys.readouterr().err
