@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Base class of elements that compute an output in each period: inputs that are too old end in the safe default.
+#pragma once
+
+#include "mauve_rt/elements/latest_sample.hpp"
+#include "mauve_rt/elements/update.hpp"
+
+namespace mauve {
+
+/// Writes a computed value in each period while the inputs are usable. When the inputs no longer are, the type's default is written,
+/// once, and the computation begins again with the next usable inputs. The shell has a port `output`.
+template <typename ShellType, Described Out>
+class GuardedCore : public UpdateCore<ShellType> {
+ public:
+  /// [rt] as far as read_inputs(), compute() and reset() are.
+  void update() final {
+    if (read_inputs()) {
+      this->shell().output.write(compute());
+      is_default_ = false;
+    } else if (!is_default_) {
+      reset();
+      this->shell().output.write(default_);
+      is_default_ = true;
+    }
+  }
+  /// The output holds what the old core wrote last.
+  void take(CoreBase& /*old*/) noexcept override { is_default_ = false; }
+
+ protected:
+  /// Reads all inputs; whether each is fresh and a finite number. [rt]
+  virtual bool read_inputs() = 0;
+  /// The next value of the output. [rt]
+  virtual Out compute() = 0;
+  /// Forgets what compute() keeps from one period to the next. [rt]
+  virtual void reset() = 0;
+
+  bool configure_hook() override {
+    is_default_ = true;
+    reset();
+    return true;
+  }
+  bool is_fresh(const LatestSample<Out>& sample, std::int64_t max_age_ms) const noexcept {
+    return sample.is_fresh(this->clock_ns(), ms_to_ns(max_age_ms));
+  }
+  double period_s() const noexcept { return static_cast<double>(this->period_ns()) * 1e-9; }
+
+ private:
+  bool is_default_{true};  // or the port has written nothing yet
+  Out default_{};
+};
+
+}  // namespace mauve
