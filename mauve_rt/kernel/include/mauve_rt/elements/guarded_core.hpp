@@ -7,19 +7,19 @@
 
 namespace mauve {
 
-/// Writes a computed value in each period while the inputs are usable. When the inputs no longer are, the type's default is written,
-/// once, and the computation begins again with the next usable inputs. The shell has a port `output`.
-template <typename ShellType, Described Out>
+/// Writes its output in each period while the inputs are usable. When the inputs no longer are, it writes the safe default, once, and
+/// begins again with the next usable inputs.
+template <typename ShellType>
 class GuardedCore : public UpdateCore<ShellType> {
  public:
-  /// [rt] as far as read_inputs(), compute() and reset() are.
+  /// [rt] as far as the functions below are.
   void update() final {
     if (read_inputs()) {
-      this->shell().output.write(compute());
+      write_output();
       is_default_ = false;
     } else if (!is_default_) {
       reset();
-      this->shell().output.write(default_);
+      write_default();
       is_default_ = true;
     }
   }
@@ -29,24 +29,25 @@ class GuardedCore : public UpdateCore<ShellType> {
  protected:
   /// Reads all inputs; whether each is fresh and a finite number. [rt]
   virtual bool read_inputs() = 0;
-  /// The next value of the output. [rt]
-  virtual Out compute() = 0;
-  /// Forgets what compute() keeps from one period to the next. [rt]
-  virtual void reset() = 0;
+  /// Computes and writes. [rt]
+  virtual void write_output() = 0;
+  virtual void write_default() = 0;
+  /// Forgets what write_output() keeps from one period to the next. [rt]
+  virtual void reset() {}
 
   bool configure_hook() override {
     is_default_ = true;
     reset();
     return true;
   }
-  bool is_fresh(const LatestSample<Out>& sample, std::int64_t max_age_ms) const noexcept {
+  template <Described T>
+  bool is_fresh(const LatestSample<T>& sample, std::int64_t max_age_ms) const noexcept {
     return sample.is_fresh(this->clock_ns(), ms_to_ns(max_age_ms));
   }
   double period_s() const noexcept { return static_cast<double>(this->period_ns()) * 1e-9; }
 
  private:
   bool is_default_{true};  // or the port has written nothing yet
-  Out default_{};
 };
 
 }  // namespace mauve

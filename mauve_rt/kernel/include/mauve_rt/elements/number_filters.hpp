@@ -22,26 +22,31 @@ struct NumberFilterShell : FilterShell<T> {
 
 /// Reads one input of numbers; a successor of its kind goes on with the sample that it has.
 template <typename ShellType, DoubleFields T>
-class NumberFilterCore : public GuardedCore<ShellType, T> {
+class NumberFilterCore : public GuardedCore<ShellType> {
  public:
   void take(CoreBase& old) noexcept override {
-    GuardedCore<ShellType, T>::take(old);
+    GuardedCore<ShellType>::take(old);
     if (const auto* other = dynamic_cast<const NumberFilterCore*>(&old)) input_ = other->input_;
   }
 
  protected:
-  const T& input() const noexcept { return input_.value(); }
+  /// The next value of the output. [rt]
+  virtual T compute(const T& input) = 0;
+
   bool read_inputs() final {
     input_.update(this->shell().input);
     return this->is_fresh(input_, this->shell().max_age_ms) && is_finite(input_.value());
   }
+  void write_output() final { this->shell().output.write(compute(input_.value())); }
+  void write_default() final { this->shell().output.write(default_); }
   bool configure_hook() override {
     input_ = {};
-    return GuardedCore<ShellType, T>::configure_hook();
+    return GuardedCore<ShellType>::configure_hook();
   }
 
  private:
   LatestSample<T> input_;
+  T default_{};  // kept here, as SelectorCore's
 };
 
 /// `minimum`, `maximum` and `max_rate`, of a message with several fields once for each: linear_minimum ... for a Twist.
@@ -81,7 +86,7 @@ class LimiterCore final : public NumberFilterCore<LimiterShell<T>, T> {
   MAUVE_STATE(output_)
 
  protected:
-  T compute() override {
+  T compute(const T& input) override {
     std::size_t field = 0;
     const auto limit = [&](auto member) {
       const auto& limits = this->shell().limits[field++];
@@ -90,11 +95,11 @@ class LimiterCore final : public NumberFilterCore<LimiterShell<T>, T> {
       const double rate = *limits.max_rate;
       const double step = rate > 0.0 ? rate * this->period_s() : HUGE_VAL;
       for_each_double(
-          [&](double& output, double input) {
-            const double wanted = std::max(minimum, std::min(input, maximum));
+          [&](double& output, double number) {
+            const double wanted = std::max(minimum, std::min(number, maximum));
             output = std::clamp(wanted, output - step, output + step);
           },
-          output_.*member, this->input().*member);
+          output_.*member, input.*member);
     };
     std::apply([&](auto... member) { (limit(member), ...); }, TypeTraits<T>::fields());
     return output_;
@@ -118,12 +123,12 @@ class LowPassCore final : public NumberFilterCore<LowPassShell<T>, T> {
   MAUVE_STATE(output_, is_running_)
 
  protected:
-  T compute() override {
+  T compute(const T& input) override {
     const double time_constant_s = this->shell().time_constant_s;
     const double kept =
         is_running_ && time_constant_s > 0.0 ? std::exp(-this->period_s() / time_constant_s) : 0.0;
-    for_each_double([&](double& output, double input) { output = input + kept * (output - input); }, output_,
-                    this->input());
+    for_each_double([&](double& output, double number) { output = number + kept * (output - number); },
+                    output_, input);
     is_running_ = true;
     return output_;
   }

@@ -82,7 +82,7 @@ struct PidShell : PeriodicShell {
 /// replaces this one goes on with `integral`, `rate`, `measured` and `is_running`:
 ///
 ///   architecture.add_component<PidShell, PidCore, PeriodicUpdateFsm<PidShell>>("speed");
-class PidCore final : public GuardedCore<PidShell, types::Float64> {
+class PidCore final : public GuardedCore<PidShell> {
  public:
   std::vector<StateField> state_fields() override {
     return make_state_fields("integral, rate, measured, is_running", pid_.integral, pid_.rate, pid_.measured,
@@ -103,7 +103,7 @@ class PidCore final : public GuardedCore<PidShell, types::Float64> {
     return is_fresh(set_point_, shell().set_point_max_age_ms) && is_fresh(measured_, shell().max_age_ms) &&
            is_finite(set_point_.value()) && is_finite(measured_.value());
   }
-  types::Float64 compute() override {
+  void write_output() override {
     const Pid::Settings settings{.kp = shell().kp,
                                  .ki = shell().ki,
                                  .kd = shell().kd,
@@ -112,8 +112,10 @@ class PidCore final : public GuardedCore<PidShell, types::Float64> {
                                  .anti_windup_s = shell().anti_windup_s,
                                  .minimum = shell().minimum,
                                  .maximum = shell().maximum};
-    return {pid_.update(settings, set_point_.value().data, measured_.value().data, period_s())};
+    shell().output.write(
+        {pid_.update(settings, set_point_.value().data, measured_.value().data, period_s())});
   }
+  void write_default() override { shell().output.write({}); }
   void reset() override { pid_ = {}; }
   bool configure_hook() override {
     set_point_ = {};
