@@ -33,12 +33,10 @@ def tables(shell: ShellDescription) -> str:
     """Write the tables of an element: ports, then properties but the period."""
     ports = [f"| `{port.name}` | {port.kind} | `{port.type}` |" for port in shell.ports]
     rows = [_row(entry) for entry in shell.properties if entry.name != "period_us"]
-    return "\n".join(
-        [
-            *("| port | | type |", "| --- | --- | --- |", *ports, ""),
-            *("| property | unit | default | meaning |", "| --- | --- | --- | --- |", *rows, ""),
-        ]
-    )
+    written = ["| port | | type |", "| --- | --- | --- |", *ports, ""]
+    if rows:
+        written += ["| property | unit | default | meaning |", "| --- | --- | --- | --- |", *rows, ""]
+    return "\n".join(written)
 
 
 @pytest.mark.parametrize("element", ELEMENTS)
