@@ -13,8 +13,17 @@ from nav_msgs.msg import Odometry
 from rclpy.serialization import deserialize_message, serialize_message
 from sensor_msgs.msg import JointState
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
+from waiting import wait_until
 
-from mauve_rt._kernel import MauveError, PluginRegistry, Simulation, Transaction
+from mauve_rt._kernel import (
+    Architecture,
+    Deployer,
+    MauveError,
+    PluginRegistry,
+    Simulation,
+    Transaction,
+    allocation_counting,
+)
 from mauve_rt.model import build, configure, load_architecture
 from mauve_rt.trace.format.records import RECORD, Kind
 
@@ -44,18 +53,23 @@ TRAJECTORY = (
 )
 
 
+def configured(folder: Path, element: str, before: str, after: str, properties: str = "") -> Architecture:
+    """Make an architecture of one element, with a resource at each port."""
+    file = folder / "robot.yaml"
+    text = TEXT.format(element=element, before=before, after=after, properties=properties)
+    file.write_text(text, encoding="utf-8")
+    model = load_architecture(file)
+    architecture = build(model, PluginRegistry())
+    configure(model, architecture)
+    return architecture
+
+
 class Running:
     """One element of a period of 10 ms in a simulation, with a resource at each port."""
 
     def __init__(self, folder: Path, element: str, before: str, after: str, properties: str = "") -> None:
-        file = folder / "robot.yaml"
-        text = TEXT.format(element=element, before=before, after=after, properties=properties)
-        file.write_text(text, encoding="utf-8")
-        model = load_architecture(file)
-        architecture = build(model, PluginRegistry())
-        configure(model, architecture)
         self.simulation = Simulation()
-        self.host = self.simulation.add(architecture)
+        self.host = self.simulation.add(configured(folder, element, before, after, properties))
         self.simulation.deploy()
         self.simulation.run_until(self.simulation.epoch_ns())
 
@@ -279,3 +293,36 @@ def test_an_output_with_too_little_room_is_refused(tmp_path: Path) -> None:
     small = STATE.replace("velocity: 2", "velocity: 1")
     with pytest.raises(MauveError, match=r"too little room.*expected a capacity of at least 2.*found 1"):
         Running(tmp_path, "JointTrajectory", TRAJECTORY, small)
+
+
+@pytest.mark.skipif(allocation_counting() == "none", reason="built with a sanitizer")
+@pytest.mark.parametrize(
+    ("element", "before", "after", "message"),
+    [
+        ("DifferentialDriveCommand", "geometry_msgs/msg/Twist", STATE, Twist(linear=Vector3(x=0.5))),
+        (
+            "DifferentialDriveOdometry",
+            STATE,
+            "nav_msgs/msg/Odometry",
+            JointState(name=["left_wheel_joint", "right_wheel_joint"], position=[1.0, 2.0]),
+        ),
+        ("JointTrajectory", TRAJECTORY, STATE, trajectory([(0.02, [1.0, 2.0]), (0.05, [2.0, 1.0])])),
+    ],
+)
+def test_the_elements_allocate_nothing_on_their_threads(
+    tmp_path: Path, element: str, before: str, after: str, message: Any
+) -> None:
+    architecture = configured(tmp_path, element, before, after, "period_us: 1000")
+    deployer = Deployer(architecture)
+    deployer.deploy()
+    try:
+        for count in range(1, 4):
+            assert deployer.write_resource("before", serialize_message(message))
+            wait_until(lambda count=count: deployer.read_resource("after")[1] >= count)
+        deployer.replace_core("element", f"mauve_rt/{element}")
+        releases = architecture.components()[0].releases
+        wait_until(lambda: architecture.components()[0].releases > releases + 2)
+        deployer.stop("element")
+        assert architecture.components()[0].allocations == 0
+    finally:
+        deployer.shutdown()
