@@ -233,7 +233,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     remove(readers_.head.load(std::memory_order_relaxed));  // relaxed: written under this lock
     return loan;
   }
-  void end_loan(const Loan<T>& loan, ReaderState& reader) noexcept {
+  void end_loan(const Loan<T>& loan, ReaderState& reader) MAUVE_RT {
     if (loan.value == nullptr) return;
     const BiasedMutex::Hold hold(readers_mutex(), reader.seat);
     MAUVE_RT_TRUSTED(
@@ -253,7 +253,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     writers_.spares.pop_back();
     return place;
   }
-  void give_back(T& place) noexcept {
+  void give_back(T& place) MAUVE_RT {
     MAUVE_RT_TRUSTED(writers_.spares.push_back(&place));  // within its capacity: add_spares()
   }
   bool publish(T& value, time_ns_t time_ns) noexcept {
