@@ -65,7 +65,9 @@ def _parts(loader: "PluginLoader", name: str) -> Iterator[dict[str, Any]]:
     from mauve_rt.model.plugins import KINDS  # noqa: PLC0415
 
     registry = loader.registry
-    for kind in [kind for kind in KINDS if loader.has(kind, name)] or ["core"]:  # which then says what is near
+    for kind in [kind for kind in KINDS if loader.has(kind, name)] or [
+        "core"
+    ]:  # which then says what is near
         loader.require(kind, name)
         part: dict[str, Any] = {"kind": kind, "name": name}
         if kind == "core":
@@ -144,7 +146,9 @@ def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
         shell = f", shell {part['shell']}" if part.get("shell") else ""
         out.print(f"[bold]{part['kind']}[/] {part['name']}{shell}", soft_wrap=True)
         if ports := part.get("ports"):
-            rows = [each | {"port": each["name"], "": "" if each["required"] else "optional"} for each in ports]
+            rows = [
+                each | {"port": each["name"], "": "" if each["required"] else "optional"} for each in ports
+            ]
             out.print(_table(rows, ("port", "kind", "type", "")))
         if settings := part.get("properties", part.get("parameters")):
             head = "property" if "properties" in part else "parameter"
@@ -160,7 +164,9 @@ def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
             out.print(_table(rows, ("state", "kind", "time", "next")))
         if "bytes" in part:
             lists = ", ".join(part["capacities"])
-            out.print(f"{part['bytes']:,} bytes" + (f", lists that need a capacity: {lists}" if lists else ""))
+            out.print(
+                f"{part['bytes']:,} bytes" + (f", lists that need a capacity: {lists}" if lists else "")
+            )
 
 
 def _range(setting: Mapping[str, Any]) -> str:

@@ -29,7 +29,7 @@ from mauve_rt.cli.completion import (
     completed_by,
 )
 from mauve_rt.cli.verb import BAD_USAGE, OK, Verb
-from mauve_rt.errors import ArchitectureFileError, one_line
+from mauve_rt.errors import ArchitectureFileError
 
 _LOOK_S = 0.02  # between two looks at what a change cost
 

@@ -187,7 +187,9 @@ class PluginLoader:
         """
         plugin = self.index.find(kind, name)
         source = self._sources.get((kind, name), "")
-        if plugin is not None and kind not in _TYPES:  # a type may be of another library than the index's first
+        if (
+            plugin is not None and kind not in _TYPES
+        ):  # a type may be of another library than the index's first
             source = plugin.source
         if change := self._loaded.change_of(source):
             raise PluginError(f"{kind} '{name}': {change}", element=name, remedy=REMEDY)

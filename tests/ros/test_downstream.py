@@ -129,6 +129,25 @@ def test_a_package_uses_messages_by_one_line_of_cmake(prefix: Path, tmp_path: Pa
     assert not host.write_resource("joints", serialize_message(JointState(position=[1.0] * 4)))
 
 
+def test_the_build_lists_what_libraries_register(prefix: Path) -> None:
+    index = prefix / "share/ament_index/resource_index/mauve_rt_plugins/mauve_downstream"
+    lines = index.read_text(encoding="utf-8").splitlines()
+    by_hand = (PACKAGE / "plugins.txt").read_text(encoding="utf-8").splitlines()
+    assert lines[: len(by_hand)] == by_hand
+    assert set(lines[len(by_hand) :]) == {
+        "core; mauve_downstream/Doubler; mauve_rt/Float64RelayShell; mauve_downstream",
+        "type; sensor_msgs/msg/JointState; ; mauve_downstream_sum",
+        "type; std_msgs/msg/Float64; ; mauve_downstream_sum",
+        "shell; mauve_downstream/SumShell; ; mauve_downstream_sum",
+        "core; mauve_downstream/Sum; mauve_downstream/SumShell; mauve_downstream_sum",
+        "fsm; mauve_downstream/SumFsm; mauve_downstream/SumShell; mauve_downstream_sum",
+        "type; mauve_downstream/msg/Leg; ; mauve_downstream_leg",
+        "shell; mauve_downstream/LegShell; ; mauve_downstream_leg",
+        "core; mauve_downstream/Leg; mauve_downstream/LegShell; mauve_downstream_leg",
+        "fsm; mauve_downstream/LegFsm; mauve_downstream/LegShell; mauve_downstream_leg",
+    }
+
+
 def test_a_struct_is_a_message_by_one_call_of_cmake(
     prefix: Path, msg: ModuleType, capsys: pytest.CaptureFixture[str]
 ) -> None:

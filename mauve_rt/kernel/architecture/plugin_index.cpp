@@ -61,7 +61,8 @@ std::string plugin_lines(PluginRegistry& registry, const std::string& library, c
     const std::string kind = kKinds[i];
     for (const std::string& name : registry.names(kind)) {
       if (std::ranges::binary_search(before[i], name) ||
-          std::ranges::find(given, name, &ResourceKind::name) != given.end()) continue;
+          std::ranges::find(given, name, &ResourceKind::name) != given.end())
+        continue;
       lines += kind + "; " + name + "; " + shell_of(registry, kind, name) + "; " + target + '\n';
     }
   }

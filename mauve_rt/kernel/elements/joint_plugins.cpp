@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The elements of joints for architecture files: mauve_rt/JointTrajectory ... CMakeLists.txt lists the same for the ament index.
+// The elements of joints for architecture files: mauve_rt/JointTrajectory.
 #include "joint_plugins.hpp"
 
 #include <algorithm>

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The basic elements of the common types, for architecture files: mauve_rt/TwistRelay, mauve_rt/PoseFilterShell ...
-// CMakeLists.txt lists the same types for the ament index.
 #include "mauve_rt/elements/elements.hpp"
 
 MAUVE_PLUGINS(registry) {

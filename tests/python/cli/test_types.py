@@ -32,7 +32,7 @@ def test_all_types_have_their_size_capacities_and_library(
     found: dict[str, Any] = {row["type"]: row for row in json.loads(run("--json", capsys=capsys))}
     joints = found["sensor_msgs/msg/JointState"]
     assert joints["capacities"] == ["name", "position", "velocity", "effort"]
-    assert joints["library"] == "executor_tests"
+    assert found["executor_tests/Attitude"]["library"] == "executor_tests"
     assert found["std_msgs/msg/Float64"]["bytes"] == 8
     assert found["executor_tests/Attitude"]["capacities"] == []
     table = run(capsys=capsys)

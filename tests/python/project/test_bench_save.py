@@ -41,7 +41,7 @@ def test_a_save_that_leads_to_no_release_is_no_figure() -> None:
 def test_the_package_is_the_tutorials(tmp_path: Path) -> None:
     save._write_package(tmp_path)
     names = {str(path.relative_to(tmp_path)) for path in tmp_path.rglob("*") if path.is_file()}
-    sources = {"src/room.hpp", "src/plugins.cpp", "plugins.txt", "CMakeLists.txt", "package.xml"}
+    sources = {"src/room.hpp", "src/plugins.cpp", "CMakeLists.txt", "package.xml"}
     assert names == {"room.yaml", *(f"climate/{name}" for name in sources)}
     source = tmp_path / "climate" / "src" / "room.hpp"
     texts = {source.read_text("utf-8")}

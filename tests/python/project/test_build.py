@@ -40,7 +40,7 @@ def _setup_that_runs(commands: str, clone: Path) -> Path:
     return setup
 
 
-@pytest.mark.parametrize(("option", "least", "most"), [("ON", 3, 6), ("OFF", 80, 1000)])
+@pytest.mark.parametrize(("option", "least", "most"), [("ON", 3, 7), ("OFF", 80, 1000)])
 def test_a_library_is_compiled_in_units_unless_told_otherwise(
     tmp_path: Path, option: str, least: int, most: int
 ):

@@ -8,7 +8,8 @@ namespace mauve {
 
 /// Loads a library and lists what it registers, a line each: kind; name; shell; target. Types and calls that another library of
 /// this process has registered before are not among them. [setup] Throws Error (plugin) as PluginRegistry::load_library().
-std::string plugin_lines(class PluginRegistry& registry, const std::string& library, const std::string& target);
+std::string plugin_lines(class PluginRegistry& registry, const std::string& library,
+                         const std::string& target);
 
 /// The program that CMake's mauve_rt_register_plugins() builds and runs:
 ///   PROGRAM OUTPUT [--with FILE] [TARGET LIBRARY]...

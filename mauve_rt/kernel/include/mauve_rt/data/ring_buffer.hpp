@@ -189,7 +189,8 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     std::unique_ptr<T> make() const override { return owner_.limits().make(); }
     bool is_whole(const T& value) noexcept override { return owner_.limits().admits(value); }
     void make_room(std::uint32_t ports) override {
-      if constexpr (kIsLarge<T>) owner_.make_spares(owner_.readers_.spares, owner_.readers_mutex(), ports + kOtherReaders);
+      if constexpr (kIsLarge<T>)
+        owner_.make_spares(owner_.readers_.spares, owner_.readers_mutex(), ports + kOtherReaders);
     }
 
    private:
