@@ -14,4 +14,9 @@ MAUVE_PLUGINS(registry) {
   register_elements<types::Pose>(registry, "mauve_rt/Pose");
   register_elements<types::Pose2D>(registry, "mauve_rt/Pose2D");
   register_elements<types::Twist>(registry, "mauve_rt/Twist");
+  register_element<PidCore>(registry, "mauve_rt/Pid");
+  register_element<LimiterCore<types::Float64>>(registry, "mauve_rt/Float64Limiter");
+  register_element<LimiterCore<types::Twist>>(registry, "mauve_rt/TwistLimiter");
+  register_element<LowPassCore<types::Float64>>(registry, "mauve_rt/Float64LowPass");
+  register_element<LowPassCore<types::Twist>>(registry, "mauve_rt/TwistLowPass");
 }

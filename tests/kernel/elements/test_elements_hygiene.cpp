@@ -13,12 +13,12 @@ class ElementsHygiene : public Deployed {
       GTEST_SKIP() << "a sanitizer's operators new take the place of the counting ones";
   }
   template <typename CoreType>
-  void add_element(const std::string& name, const std::string& port) {
+  void add_element(const std::string& name, const std::string& port, const std::string& output = "output") {
     using ShellType = typename CoreType::shell_type;
     architecture.add_component<ShellType, CoreType, PeriodicUpdateFsm<ShellType>>(name);
     architecture.add_resource<SharedData<Float64>>(name + "_out");
     architecture.connect(name, port, "in", "read");
-    architecture.connect(name, "output", name + "_out", "write");
+    architecture.connect(name, output, name + "_out", "write");
   }
   void wait_releases() {
     for (const auto& component : architecture.components()) {
@@ -34,6 +34,10 @@ TEST_F(ElementsHygiene, NoAllocationOnAComponentThread) {
   add_element<RelayCore<Float64>>("relay", "input");
   add_element<MultiplexerCore<Float64, 2>>("multiplexer", "input_1");
   add_element<PriorityMultiplexerCore<Float64, 2>>("priority", "input_1");
+  add_element<LimiterCore<Float64>>("limiter", "input");
+  add_element<LowPassCore<Float64>>("low_pass", "input");
+  add_element<PidCore>("pid", "measured", "command");
+  architecture.connect("pid", "set_point", "in", "read");
   deploy();
   in.write.write({1.0}, monotonic_now_ns());
   wait_releases();

@@ -63,6 +63,7 @@ def test_the_demo_builds_only_what_it_runs(tmp_path: Path):
         "libmauve_msgs__rosidl_typesupport_fastrtps_cpp.so",
         "libmauve_msgs__rosidl_typesupport_introspection_cpp.so",
         "libmauve_rt_elements.so",
+        "libmauve_rt_joint_elements.so",
         "libmauve_tutorials.so",
     }
     assert {"libmauve_rt_rules.so", "libmauve_examples.so"} <= built["ON"]

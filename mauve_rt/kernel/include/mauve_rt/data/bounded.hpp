@@ -62,7 +62,7 @@ class BoundedText {
   /// Takes the text; false (and cut to N) when it is longer.
   bool assign(View text) MAUVE_RT {
     size_ = static_cast<std::uint32_t>(std::min(text.size(), N));
-    std::copy_n(text.data(), size_, text_.data());
+    std::copy_n(text.begin(), size_, text_.begin());
     return text.size() <= N;
   }
   /// Appends; false (and unchanged) when full.

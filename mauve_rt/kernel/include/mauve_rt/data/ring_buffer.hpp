@@ -254,7 +254,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     remove(readers_.head.load(std::memory_order_relaxed));  // relaxed: written under this lock
     return loan;
   }
-  void end_loan(const Loan<T>& loan, ReaderState& reader) noexcept {
+  void end_loan(const Loan<T>& loan, ReaderState& reader) MAUVE_RT {
     if (loan.value == nullptr) return;
     const BiasedMutex::Hold hold(readers_mutex(), reader.seat);
     MAUVE_RT_TRUSTED(
@@ -274,7 +274,7 @@ class RingBuffer final : public LoggedResource<T, Resource> {
     writers_.spares.pop_back();
     return place;
   }
-  void give_back(T& place) noexcept {
+  void give_back(T& place) MAUVE_RT {
     if (&place == writers_.looked_at) {
       writers_.is_kept = true;  // until end_look()
       return;
