@@ -72,7 +72,8 @@ TEST_F(Servers, APollingServerLosesTheBudgetOfAPeriodInWhichNothingWaits) {
   EXPECT_THAT(served(), IsEmpty());
   request_at(51, 1, 3);
   run_to(ms_to_ns(100));
-  EXPECT_THAT(served(), ElementsAre(Pair(1, 60), Pair(2, 60), Pair(3, 70))) << "at no other instant, and no more";
+  EXPECT_THAT(served(), ElementsAre(Pair(1, 60), Pair(2, 60), Pair(3, 70)))
+      << "at no other instant, and no more";
 }
 
 TEST_F(Servers, ADeferrableServerServesAtOnceAndKeepsItsBudget) {
@@ -99,8 +100,8 @@ TEST_F(Servers, ADeferrableServersPeriodsMeetBackToBack) {
   request_at(58.5, 2, 5);
   request_at(63, 7);
   run_to(ms_to_ns(100));
-  EXPECT_THAT(served(), ElementsAre(Pair(1, 50), Pair(2, 59), Pair(3, 59), Pair(4, 60), Pair(5, 60), Pair(6, 60),
-                                    Pair(7, 70)))
+  EXPECT_THAT(served(), ElementsAre(Pair(1, 50), Pair(2, 59), Pair(3, 59), Pair(4, 60), Pair(5, 60),
+                                    Pair(6, 60), Pair(7, 70)))
       << "5 requests within 1 ms, where the budget is 3 in 10 ms";
 }
 

@@ -18,30 +18,32 @@ template <Described T>
 struct ServerShell : Shell {
   using Request = T;
 
-  Property<std::int64_t>& period_us =
-      property("period_us", 10'000,
-               {.unit = "us",
-                .description = "after which the budget comes back; of a sporadic fsm the least time between two requests",
-                .minimum = 1,
-                .maximum = 3.6e9,
-                .structural = ReadBy::fsm});
+  Property<std::int64_t>& period_us = property(
+      "period_us", 10'000,
+      {.unit = "us",
+       .description =
+           "after which the budget comes back; of a sporadic fsm the least time between two requests",
+       .minimum = 1,
+       .maximum = 3.6e9,
+       .structural = ReadBy::fsm});
   Property<std::int64_t>& budget = property("budget", 1,
                                             {.description = "requests that a server serves in a period",
                                              .minimum = 1,
                                              .maximum = 64,
                                              .structural = ReadBy::fsm});
-  Property<std::int64_t>& polls = property("polls", 10,
-                                           {.description = "how often a deferrable server looks for requests in a period",
-                                            .minimum = 1,
-                                            .maximum = 64,
-                                            .structural = ReadBy::fsm});
-  Property<std::int64_t>& wcet_us =
-      property("wcet_us", 0,
-               {.unit = "us",
-                .description = "worst-case execution time of one request, for the timing analysis; 0: not declared",
-                .minimum = 0,
-                .maximum = 3.6e9,
+  Property<std::int64_t>& polls =
+      property("polls", 10,
+               {.description = "how often a deferrable server looks for requests in a period",
+                .minimum = 1,
+                .maximum = 64,
                 .structural = ReadBy::fsm});
+  Property<std::int64_t>& wcet_us = property(
+      "wcet_us", 0,
+      {.unit = "us",
+       .description = "worst-case execution time of one request, for the timing analysis; 0: not declared",
+       .minimum = 0,
+       .maximum = 3.6e9,
+       .structural = ReadBy::fsm});
   ReadPort<T>& requests = this->template read_port<T>("requests");
 };
 
@@ -56,9 +58,7 @@ template <typename ShellType>
 class ServerCore : public Core<ShellType> {
  public:
   /// Takes the next request; false when none waits. [rt]
-  bool take_request() MAUVE_RT {
-    return this->shell().requests.read(request_) == DataStatus::new_data;
-  }
+  bool take_request() MAUVE_RT { return this->shell().requests.read(request_) == DataStatus::new_data; }
   /// Called once for each request. [rt] as far as the core is.
   virtual void serve() = 0;
 
@@ -88,9 +88,10 @@ class ServerFsm : public Fsm<ShellType, CoreType> {
     return state;
   }
   /// A wait for a request, which then goes to `served`. It also ends, once, for requests that another state has taken since; then it
-  /// goes on to wait. [setup]
+  /// waits for the next one, and for a hundredth of the period at least: the analysis follows each release. [setup]
   State& awaiting(State& served) {
-    State& state = this->wait_event("AwaitRequest", this->shell().requests, kForever, us_to_ns(10));
+    State& state = this->wait_event("AwaitRequest", this->shell().requests, kForever,
+                                    us_to_ns(this->shell().period_us) / 100);
     take(state, served, state);
     return state;
   }
