@@ -114,6 +114,14 @@ TEST_F(Servers, ADeferrableServerIsAtOnceAgainAfterAPeriodWithPolls) {
   EXPECT_THAT(served(), ElementsAre(Pair(1, 50), Pair(2, 54), Pair(3, 60.25)));
 }
 
+TEST_F(Servers, AServerThatHasJustBecomeIdleServesAHundredthOfThePeriodLate) {
+  deploy_server<DeferrableServerFsm>(3);
+  request_at(50, 1);
+  request_at(60.02, 2);
+  run_to(ms_to_ns(100));
+  EXPECT_THAT(served(), ElementsAre(Pair(1, 50), Pair(2, 60.1)));
+}
+
 TEST_F(Servers, ASporadicTaskServesRequestsFromBeforeTheStart) {
   deploy_server<SporadicFsm>(1, 64, 2);
   run_to(ms_to_ns(30));
