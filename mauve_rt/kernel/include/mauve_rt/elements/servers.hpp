@@ -144,6 +144,7 @@ class DeferrableServerFsm : public ServerFsm<ShellType, CoreType> {
     polls_ = static_cast<std::size_t>(this->shell().polls.value());
     const auto budget = static_cast<std::size_t>(this->shell().budget.value());
     std::vector<State*> ends;  // from a poll to the end of the period
+    ends.reserve(polls_);
     for (std::size_t poll = 0; poll < polls_; ++poll)
       ends.push_back(&this->wait("Period_" + std::to_string(poll), between(poll, polls_)));
     this->set_initial(*ends.back());  // a request from before the start has no event
