@@ -6,6 +6,11 @@ namespace mauve::testing::test_elements_hygiene {
 
 using types::Float64;
 
+struct Served : ServerCore<ServerShell<Float64>> {
+  std::atomic<int> count{0};
+  void serve() override { ++count; }
+};
+
 class ElementsHygiene : public Deployed {
  protected:
   void SetUp() override {
@@ -20,6 +25,16 @@ class ElementsHygiene : public Deployed {
     architecture.connect(name, port, "in", "read");
     architecture.connect(name, output, name + "_out", "write");
   }
+  template <template <typename, typename> typename FsmType>
+  void add_server(const std::string& name) {
+    using ShellType = ServerShell<Float64>;
+    auto& server =
+        architecture.add_component<ShellType, Served, FsmType<ShellType, ServerCore<ShellType>>>(name);
+    server.set_property("period_us", std::int64_t{1000});
+    servers_.push_back(&server);
+    rings_.push_back(&architecture.add_resource<RingBuffer<Float64>>(name + "_ring", std::size_t{8}));
+    architecture.connect(name, "requests", name + "_ring", "read");
+  }
   void wait_releases() {
     for (const auto& component : architecture.components()) {
       const auto& releases = component->task().statistics().releases;
@@ -27,6 +42,9 @@ class ElementsHygiene : public Deployed {
       wait_until([&] { return releases.load() >= before + 3; }, "the elements to run");
     }
   }
+
+  std::vector<Component*> servers_;
+  std::vector<RingBuffer<Float64>*> rings_;
 };
 
 TEST_F(ElementsHygiene, NoAllocationOnAComponentThread) {
@@ -49,6 +67,21 @@ TEST_F(ElementsHygiene, NoAllocationOnAComponentThread) {
   deployer.shutdown();
   for (const auto& component : architecture.components())
     EXPECT_EQ(0U, component->task().counters().allocations()) << component->name();
+}
+
+TEST_F(ElementsHygiene, NoAllocationOnTheThreadOfAServer) {
+  add_server<SporadicFsm>("sporadic");
+  add_server<PollingServerFsm>("polling");
+  add_server<DeferrableServerFsm>("deferrable");
+  deploy();
+  for (int i = 0; i < 4; ++i) {
+    for (RingBuffer<Float64>* const ring : rings_) ring->write.write({1.0}, monotonic_now_ns());
+  }
+  for (Component* const server : servers_)
+    wait_until([&] { return server->core_as<Served>().count == 4; }, "the requests to be served");
+  deployer.shutdown();
+  for (Component* const server : servers_)
+    EXPECT_EQ(0U, server->task().counters().allocations()) << server->name();
 }
 
 }  // namespace mauve::testing::test_elements_hygiene

@@ -15,10 +15,14 @@ NUMBER = re.compile(r"\b\d[\d.]*\b")
 
 
 def registered_shell(element: str) -> ShellDescription:
-    """The shell of an element, by the library that the index names."""
+    """The shell of an element, by the library that the index names; or that of this name."""
     registry = PluginRegistry()
-    PluginLoader(registry, PluginIndex.installed()).require("core", f"mauve_rt/{element}")
-    return registry.describe_shell(registry.core_shell(f"mauve_rt/{element}"))
+    loader, name = PluginLoader(registry, PluginIndex.installed()), f"mauve_rt/{element}"
+    if element.endswith("Shell"):
+        loader.require("shell", name)
+        return registry.describe_shell(name)
+    loader.require("core", name)
+    return registry.describe_shell(registry.core_shell(name))
 
 
 def _row(entry: PropertyDescription) -> str:
@@ -30,9 +34,9 @@ def _row(entry: PropertyDescription) -> str:
 
 
 def tables(shell: ShellDescription) -> str:
-    """Write the tables of an element: ports, then properties but the period."""
+    """Write the tables of an element: ports, then properties but the period of an update."""
     ports = [f"| `{port.name}` | {port.kind} | `{port.type}` |" for port in shell.ports]
-    rows = [_row(entry) for entry in shell.properties if entry.name != "period_us"]
+    rows = [_row(entry) for entry in shell.properties if entry.description != "from one update to the next"]
     written = ["| port | | type |", "| --- | --- | --- |", *ports, ""]
     if rows:
         written += ["| property | unit | default | meaning |", "| --- | --- | --- | --- |", *rows, ""]
