@@ -63,7 +63,9 @@ std::string plugin_lines(PluginRegistry& registry, const std::string& library, c
       if (std::ranges::binary_search(before[i], name) ||
           std::ranges::find(given, name, &ResourceKind::name) != given.end())
         continue;
-      lines += kind + "; " + name + "; " + shell_of(registry, kind, name) + "; " + target + '\n';
+      for (const std::string& word : {kind, name, shell_of(registry, kind, name)})
+        lines.append(word).append("; ");
+      lines.append(target) += '\n';
     }
   }
   return lines;
