@@ -178,7 +178,7 @@ def test_downstream_core_replaces_a_running_one(
             "expected a shared library, found that 'archive' is of type STATIC",
         ),
         ("plugins.txt cores", "found 'plugins.txt;cores'"),
-        ("PACKAGE mine", "expected [<index file>] [PACKAGE <name>] [LIBRARIES <target>...], found ''"),
+        ("", "expected [<index file>] [PACKAGE <name>] [LIBRARIES <target>...], found ''"),
     ],
 )
 def test_wrong_call_says_what_is_wrong(call: str, message: str, tmp_path: Path) -> None:
