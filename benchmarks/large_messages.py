@@ -115,7 +115,7 @@ class Stage:
             options |= {"period-us": str(1_000_000 // self._kind.rate_hz)}
             options |= {"priority": str(self._settings.priority), "cpu": str(self._settings.cpu)}
         else:
-            options |= {"file": str(self._processes.folder / "taken_bare")}
+            options |= {"publishers": "2", "file": str(self._processes.folder / "taken_bare")}
         words = [word for name, value in options.items() for word in (f"--{name}", value)]
         pid = self._processes.spawn(word, _PROGRAM, word, *words)
         self._processes.await_output(word, "ready")

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Sends and takes large messages with rcl alone.
 //   send --type image|cloud --topic NAME --period-us N [--priority 80] [--cpu 0]
-//   take --type image|cloud --topic NAME --file FILE
-// Both print `ready`. The sender sends from a thread like a component's; at the line `start` it begins, at `stop` it pauses.
+//   take --type image|cloud --topic NAME --publishers N --file FILE
+// Both print `ready`, what takes them when it knows so many publishers. The sender sends from a thread like a component's; at the line `start` it begins, at `stop` it pauses.
 // What takes them writes at a line to the file when each was sent and taken, and prints `written`.
 #include <rosidl_runtime_c/primitives_sequence_functions.h>
 #include <sensor_msgs/msg/image.h>
 #include <sensor_msgs/msg/point_cloud2.h>
 
+#include <chrono>
 #include <optional>
 
 #include "ros/bare_node.hpp"
@@ -90,6 +91,9 @@ void take(const bench::Options& options) {
     std::getline(std::cin, line);
     ending = true;
   }).detach();  // the process ends with or without a line
+  const auto wanted = static_cast<std::size_t>(options.number("publishers", 1));
+  for (std::size_t found = 0; found < wanted; std::this_thread::sleep_for(std::chrono::milliseconds(50)))
+    bench::check(rcl_subscription_get_publisher_count(&subscription, &found), "publisher count");
   bench::say("ready");
   while (!ending) {
     bench::check(rcl_wait_set_clear(&set), "rcl_wait_set_clear");

@@ -40,7 +40,7 @@ def _sleep(talker_stalls: list[float], duration_s: float) -> None:
 
 
 def _waits_s(process: int) -> dict[str, float]:
-    """How long each thread of a process was ready to run and did not, since it began; a stop is no such wait."""
+    """How long each thread of a process has been ready to run and did not; a stop is no such wait."""
     waits = {}
     for thread in Path(f"/proc/{process}/task").iterdir():
         with contextlib.suppress(OSError):  # it has ended
@@ -64,7 +64,7 @@ def test_a_stop_of_the_executor_is_no_silence(listener: Listener, talker: Talker
         waits_s = _waits_s(listener.process())
         os.kill(listener.process(), signal.SIGCONT)
         _sleep(stalls, lengths.uniform(0.15, 0.35))
-        # Else the talker was silent, or a thread of the executor could read nothing in time: that proves nothing.
+        # Else the talker was silent, or the executor's threads could read nothing in time: it proves nothing.
         now_s = _waits_s(listener.process())
         waited_s = max((now_s[thread] - waits_s.get(thread, 0.0) for thread in now_s), default=0.0)
         if max(*stalls, waited_s) < LIMIT_S / 2 and talker.longest_silence_s(began_s) < LIMIT_S / 2:
