@@ -72,6 +72,19 @@ def test_overlay_hides_the_package_below(tmp_path: Path, monkeypatch: pytest.Mon
     assert prefixes()[:2] == [over, under]
 
 
+def test_a_type_of_several_packages_is_loaded_from_mauve_rt(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    _install(tmp_path, "a_robot", "type; p/Number; ; a_robot\ntype; p/Own; ; a_robot\n")
+    _install(tmp_path, "mauve_rt", "type; p/Number; ; mauve_rt_elements\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
+    index = PluginIndex.installed()
+    assert {plugin.name: plugin.target for plugin in index} == {
+        "p/Number": "mauve_rt_elements",
+        "p/Own": "a_robot",
+    }
+
+
 def test_share_folder(plugin_prefix: Path) -> None:
     assert share_folder("executor_tests") == plugin_prefix / "share" / "executor_tests"
     assert share_folder("no_such_package") is None
