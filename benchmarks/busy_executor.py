@@ -2,12 +2,11 @@
 
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from executor_process import ExecutorProcess
 from native import ROOT
 from processes import Processes
+from scope import Scope
 
 from mauve_rt.cli.client import Client, connected
 from mauve_rt.model import load_architecture
@@ -26,7 +25,7 @@ rules:
 """
 
 
-class BusyExecutor:
+class BusyExecutor(Scope):
     """A context: inside it, the executor runs and is being asked.
 
     Raises:
@@ -34,27 +33,19 @@ class BusyExecutor:
     """
 
     def __init__(self) -> None:
-        self._stack = ExitStack()
+        super().__init__()
         self._component = load_architecture(ARCHITECTURE).components[COMPONENT]
         self.load_report = ""
 
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            self._processes = stack.enter_context(Processes())
-            self._bag = self._processes.folder / "bag"
-            self._executor = ExecutorProcess(self._processes, ARCHITECTURE, f"bag:={self._bag}")
-            self._client: Client = stack.enter_context(connected())
-            program = str(Path(__file__).with_name("rclpy_load.py"))
-            names = (f"{self._executor.namespace}/executor", f"{self._executor.namespace}/beat")
-            self._processes.spawn("load", program, *names)
-            self._processes.await_output("load", "busy")
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, traceback)
+    def _enter(self, stack: ExitStack) -> None:
+        self._processes = stack.enter_context(Processes())
+        self._bag = self._processes.folder / "bag"
+        self._executor = ExecutorProcess(self._processes, ARCHITECTURE, f"bag:={self._bag}")
+        self._client: Client = stack.enter_context(connected())
+        program = str(Path(__file__).with_name("rclpy_load.py"))
+        names = (f"{self._executor.namespace}/executor", f"{self._executor.namespace}/beat")
+        self._processes.spawn("load", program, *names)
+        self._processes.await_output("load", "busy")
 
     @property
     def priority(self) -> int:

@@ -9,8 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import native
 import numpy as np
@@ -18,6 +17,7 @@ import numpy.typing as npt
 from executor_process import ExecutorProcess
 from processes import Processes
 from rows import Row, compared
+from scope import Scope
 from settings import Settings
 from talkers import plugin_prefix
 from topics import Side, Window, process_cpu_ns
@@ -52,46 +52,38 @@ _KINDS = (
 )
 
 
-class Stage:
+class Stage(Scope):
     """A context: who sends and who takes, none of whom sends yet."""
 
     def __init__(self, settings: Settings, kind: Kind) -> None:
         self._settings = settings
         self._kind = kind
-        self._stack = ExitStack()
+        super().__init__()
 
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            self._processes = stack.enter_context(Processes())
-            client = stack.enter_context(connected())
-            plugins = plugin_prefix(self._processes.folder, package="bench_large", plugin="large")
-            sender, self._taker = (
-                ExecutorProcess(self._processes, self._architecture(part), name=part, plugins=plugins)
-                for part in ("sender", "taker")
-            )
-            sender.stop(client, "sender")
-            self._taker.wait()
-            bare_sender, self._bare_taker = self._bare("send"), self._bare("take")
-            self.senders = (
-                Side(
-                    sender.pid,
-                    lambda: sender.start(client, "sender"),
-                    lambda: sender.stop(client, "sender"),
-                ),
-                Side(
-                    bare_sender,
-                    lambda: self._processes.tell("send", "start"),
-                    lambda: self._processes.tell("send", "stop"),
-                ),
-            )
-            time.sleep(_SETTLE_S)
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, traceback)
+    def _enter(self, stack: ExitStack) -> None:
+        self._processes = stack.enter_context(Processes())
+        client = stack.enter_context(connected())
+        plugins = plugin_prefix(self._processes.folder, package="bench_large", plugin="large")
+        sender, self._taker = (
+            ExecutorProcess(self._processes, self._architecture(part), name=part, plugins=plugins)
+            for part in ("sender", "taker")
+        )
+        sender.stop(client, "sender")
+        self._taker.wait()
+        bare_sender, self._bare_taker = self._bare("send"), self._bare("take")
+        self.senders = (
+            Side(
+                sender.pid,
+                lambda: sender.start(client, "sender"),
+                lambda: sender.stop(client, "sender"),
+            ),
+            Side(
+                bare_sender,
+                lambda: self._processes.tell("send", "start"),
+                lambda: self._processes.tell("send", "stop"),
+            ),
+        )
+        time.sleep(_SETTLE_S)
 
     def measured(self, sender: Side) -> Sequence[Window]:
         """Of the sender, of the executor that takes, and of the bare program that does."""

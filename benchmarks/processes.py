@@ -8,34 +8,25 @@ import tempfile
 import time
 from contextlib import ExitStack
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from native import BenchmarkError
+from scope import Scope
 
 _START_S = 30.0
 _END_S = 10.0
 
 
-class Processes:
+class Processes(Scope):
     """A context: whatever was spawned inside it is gone after it."""
 
     def __init__(self) -> None:
-        self._stack = ExitStack()
+        super().__init__()
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def __enter__(self) -> Self:
+    def _enter(self, stack: ExitStack) -> None:
         # A domain of our own where none is set: other nodes' traffic is no part of the measurement.
         os.environ.setdefault("ROS_DOMAIN_ID", str(1 + os.getpid() % 100))
-        with ExitStack() as stack:
-            self.folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mauve_bench_")))
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, traceback)
+        self.folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="mauve_bench_")))
 
     def spawn(self, name: str, *words: str, **environment: str) -> int:
         """Start a Python program: a file, or -m and a module, and its arguments; its process id."""

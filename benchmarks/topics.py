@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import native
 import numpy as np
@@ -19,6 +18,7 @@ from native import BenchmarkError
 from processes import Processes
 from ratios import percentile
 from rows import Row, alone, compared
+from scope import Scope
 from settings import Settings
 from talkers import Talkers, plugin_prefix
 
@@ -99,29 +99,21 @@ def _sent_in(messages: Messages, window: Window) -> Messages:
     return messages[(messages[:, _SENT] >= window.begin_ns) & (messages[:, _SENT] < window.end_ns)]
 
 
-class Stage:
+class Stage(Scope):
     """A context: subscriber, publishers and executors on the same topics, none of which publishes yet."""
 
     def __init__(self, settings: Settings, *, topics: int) -> None:
         self._settings = settings
         self._topics = topics
-        self._stack = ExitStack()
+        super().__init__()
         self._executors: list[tuple[ExecutorProcess, Talkers]] = []
         self._publishers = 0
         self._releases = round(_RATE_HZ * (settings.topics_s + 5) * (settings.rounds + 1))  # room enough
 
-    def __enter__(self) -> Self:
-        with ExitStack() as stack:
-            self._processes = stack.enter_context(Processes())
-            self._plugins = plugin_prefix(self._processes.folder)
-            self._client = stack.enter_context(connected())
-            self._stack = stack.pop_all()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
-    ) -> None:
-        self._stack.__exit__(kind, error, traceback)
+    def _enter(self, stack: ExitStack) -> None:
+        self._processes = stack.enter_context(Processes())
+        self._plugins = plugin_prefix(self._processes.folder)
+        self._client = stack.enter_context(connected())
 
     def executor(self, name: str, *, bound: bool = True, sent_anywhere: bool = True) -> Side:
         """An executor with one component that writes to all topics, or to resources bound to none.

@@ -7,6 +7,7 @@
 #include <rcl/rcl.h>
 
 #include <atomic>
+#include <chrono>
 #include <iostream>
 #include <stdexcept>
 #include <string>
@@ -52,6 +53,25 @@ class BareNode {
 
 /// point_0, point_1 ..., relative to the node's namespace, as the talker's architecture names them.
 inline std::string topic_name(std::size_t number) { return "point_" + std::to_string(number); }
+
+/// Until a subscription knows so many publishers.
+inline void await_publishers(const rcl_subscription_t& subscription, std::size_t wanted) {
+  for (std::size_t found = 0; found < wanted;) {
+    check(rcl_subscription_get_publisher_count(&subscription, &found), "publisher count");
+    if (found < wanted) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+/// Becomes true at a line on the standard input, or its end. Called once.
+inline const std::atomic<bool>& ending_by_a_line() {
+  static std::atomic<bool> ending{false};
+  std::thread([] {
+    std::string line;
+    std::getline(std::cin, line);
+    ending = true;
+  }).detach();  // the process ends with or without a line
+  return ending;
+}
 
 /// Says on the standard output that everybody is there.
 inline void say(const char* word) { std::cout << word << std::endl; }

@@ -5,12 +5,13 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
-#include <fstream>
-#include <stdexcept>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "mauve_rt/base/time.hpp"
+
+#include "support/records.hpp"
 
 namespace bench {
 
@@ -41,10 +42,7 @@ class Arrivals {
     rows_[count_++] = mauve::monotonic_now_ns();
   }
   void write(const std::string& name) const {
-    std::ofstream file(name, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(rows_.data()),
-               static_cast<std::streamsize>(count_ * sizeof(mauve::time_ns_t)));
-    if (!file.flush()) throw std::runtime_error("cannot write " + name);
+    write_records(name, std::span<const mauve::time_ns_t>(rows_.data(), count_));
   }
 
  private:

@@ -2,13 +2,13 @@
 // Sends and takes large messages with rcl alone.
 //   send --type image|cloud --topic NAME --period-us N [--priority 80] [--cpu 0]
 //   take --type image|cloud --topic NAME --publishers N --file FILE
-// Both print `ready`, what takes them when it knows so many publishers. The sender sends from a thread like a component's; at the line `start` it begins, at `stop` it pauses.
-// What takes them writes at a line to the file when each was sent and taken, and prints `written`.
+// Both print `ready`. The sender sends from a thread like a component's: at the line `start` it begins, at `stop` it pauses. What
+// takes them is ready when it knows so many publishers; at a line it writes to the file when each was sent and taken, and prints
+// `written`.
 #include <rosidl_runtime_c/primitives_sequence_functions.h>
 #include <sensor_msgs/msg/image.h>
 #include <sensor_msgs/msg/point_cloud2.h>
 
-#include <chrono>
 #include <optional>
 
 #include "ros/bare_node.hpp"
@@ -21,10 +21,7 @@ namespace {
 struct Image {
   using Message = sensor_msgs__msg__Image;
   static constexpr std::size_t kBytes = bench::kImageBytes;
-  static bool init(Message& message) {
-    return sensor_msgs__msg__Image__init(&message) &&
-           rosidl_runtime_c__uint8__Sequence__init(&message.data, kBytes);
-  }
+  static constexpr auto kInit = sensor_msgs__msg__Image__init;
   static const rosidl_message_type_support_t* type() {
     return ROSIDL_GET_MSG_TYPE_SUPPORT(sensor_msgs, msg, Image);
   }
@@ -32,14 +29,20 @@ struct Image {
 struct Cloud {
   using Message = sensor_msgs__msg__PointCloud2;
   static constexpr std::size_t kBytes = bench::kCloudBytes;
-  static bool init(Message& message) {
-    return sensor_msgs__msg__PointCloud2__init(&message) &&
-           rosidl_runtime_c__uint8__Sequence__init(&message.data, kBytes);
-  }
+  static constexpr auto kInit = sensor_msgs__msg__PointCloud2__init;
   static const rosidl_message_type_support_t* type() {
     return ROSIDL_GET_MSG_TYPE_SUPPORT(sensor_msgs, msg, PointCloud2);
   }
 };
+
+/// With memory for its contents.
+template <typename Kind>
+typename Kind::Message made() {
+  typename Kind::Message message;
+  if (!Kind::kInit(&message) || !rosidl_runtime_c__uint8__Sequence__init(&message.data, Kind::kBytes))
+    throw std::runtime_error("no memory for the message");
+  return message;
+}
 
 template <typename Kind>
 void send(const bench::Options& options) {
@@ -49,8 +52,7 @@ void send(const bench::Options& options) {
   bench::check(rcl_publisher_init(&publisher, &node.get(), Kind::type(),
                                   options.text("topic", "/large").c_str(), &reliable),
                "rcl_publisher_init");
-  typename Kind::Message message;
-  if (!Kind::init(message)) throw std::runtime_error("no memory for the message");
+  typename Kind::Message message = made<Kind>();
   std::atomic<bool> stopping{false};
   std::optional<bench::RealtimeThread> loop;
   const mauve::time_ns_t period = options.number("period-us", 10'000) * 1000;
@@ -82,18 +84,10 @@ void take(const bench::Options& options) {
   rcl_wait_set_t set = rcl_get_zero_initialized_wait_set();
   bench::check(rcl_wait_set_init(&set, 1, 0, 0, 0, 0, 0, &node.context(), rcl_get_default_allocator()),
                "rcl_wait_set_init");
-  typename Kind::Message message;
-  if (!Kind::init(message)) throw std::runtime_error("no memory for the message");
+  typename Kind::Message message = made<Kind>();
   bench::Arrivals arrivals;
-  static std::atomic<bool> ending{false};
-  std::thread([] {
-    std::string line;
-    std::getline(std::cin, line);
-    ending = true;
-  }).detach();  // the process ends with or without a line
-  const auto wanted = static_cast<std::size_t>(options.number("publishers", 1));
-  for (std::size_t found = 0; found < wanted; std::this_thread::sleep_for(std::chrono::milliseconds(50)))
-    bench::check(rcl_subscription_get_publisher_count(&subscription, &found), "publisher count");
+  const std::atomic<bool>& ending = bench::ending_by_a_line();
+  bench::await_publishers(subscription, static_cast<std::size_t>(options.number("publishers", 1)));
   bench::say("ready");
   while (!ending) {
     bench::check(rcl_wait_set_clear(&set), "rcl_wait_set_clear");

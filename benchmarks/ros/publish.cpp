@@ -3,7 +3,6 @@
 //   publish [--topics 1] [--namespace /bench] [--priority 80] [--cpu 0] [--releases 0] [--file FILE]
 // Prints `ready`, then does what lines on the standard input say: start, idle (the same loop, but nothing is
 // published), stop, write (the first so many nominal and actual instants, as 64 bit integers; then prints `written`).
-#include <fstream>
 #include <optional>
 
 #include "mauve_rt/mauve_rt.hpp"
@@ -12,6 +11,7 @@
 #include "ros/stamp.hpp"
 #include "support/options.hpp"
 #include "support/realtime_thread.hpp"
+#include "support/records.hpp"
 
 namespace {
 
@@ -73,10 +73,7 @@ class BarePublisher {
     }
   }
   void write() const {
-    std::ofstream file(file_, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(releases_.data()),
-               static_cast<std::streamsize>(remembered_ * sizeof(Release)));
-    if (!file.flush()) throw std::runtime_error("cannot write " + file_);
+    bench::write_records(file_, std::span<const Release>(releases_.data(), remembered_));
     bench::say("written");
   }
 

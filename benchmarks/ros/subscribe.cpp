@@ -3,14 +3,12 @@
 //   subscribe [--topics 1] [--namespace /bench] [--publishers 1] [--capacity 1000000] --file FILE
 // Prints `ready` when it knows so many publishers of each topic. At a line on the standard input it writes what it
 // took to the file, as 64 bit integers (topic, number, instant sent, instant taken), and prints `written`.
-#include <chrono>
-#include <fstream>
-
 #include "mauve_rt/base/time.hpp"
 
 #include "ros/bare_node.hpp"
 #include "ros/stamp.hpp"
 #include "support/options.hpp"
+#include "support/records.hpp"
 
 namespace {
 
@@ -40,12 +38,8 @@ class BareSubscriber {
   }
 
   void await_publishers(std::size_t wanted) {
-    for (const rcl_subscription_t& subscription : subscriptions_) {
-      for (std::size_t found = 0; found < wanted;) {
-        bench::check(rcl_subscription_get_publisher_count(&subscription, &found), "publisher count");
-        if (found < wanted) std::this_thread::sleep_for(std::chrono::milliseconds(50));
-      }
-    }
+    for (const rcl_subscription_t& subscription : subscriptions_)
+      bench::await_publishers(subscription, wanted);
   }
 
   /// Takes what comes until told to end.
@@ -64,10 +58,7 @@ class BareSubscriber {
   }
 
   void write(const std::string& name) const {
-    std::ofstream file(name, std::ios::binary);
-    file.write(reinterpret_cast<const char*>(taken_.data()),
-               static_cast<std::streamsize>(count_ * sizeof(Taken)));
-    if (!file.flush()) throw std::runtime_error("cannot write " + name);
+    bench::write_records(name, std::span<const Taken>(taken_.data(), count_));
   }
 
  private:
@@ -98,13 +89,7 @@ extern "C" int bench_subscribe(int count, char** words) {
     BareSubscriber subscriber(options);
     subscriber.await_publishers(static_cast<std::size_t>(options.number("publishers", 1)));
     bench::say("ready");
-    static std::atomic<bool> ending{false};
-    std::thread([] {
-      std::string line;
-      std::getline(std::cin, line);
-      ending = true;
-    }).detach();  // the process ends with or without a line
-    subscriber.run(ending);
+    subscriber.run(bench::ending_by_a_line());
     subscriber.write(options.text("file", "/dev/null"));
     bench::say("written");
   });

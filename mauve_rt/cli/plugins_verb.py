@@ -9,9 +9,7 @@ from mauve_rt.cli.verb import OK
 from mauve_rt.errors import one_line
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
-    from mauve_rt._kernel import DescribedState, PropertyDescription, ShellDescription
+    from mauve_rt._kernel import DescribedState, PropertyDescription, ResourceParameter, ShellDescription
     from mauve_rt.model.plugins import PluginLoader
 
 _FIELDS = ("kind", "name", "shell", "target", "prefix")
@@ -44,9 +42,10 @@ def main(args: argparse.Namespace) -> int:
     if args.json:
         print_json(rows)
     else:
+        from mauve_rt.cli.tables import dict_table  # noqa: PLC0415 - rich takes its time to load
         from mauve_rt.cli.views import console  # noqa: PLC0415
 
-        console().print(_table(rows, _FIELDS[:4]))
+        console().print(dict_table(rows, _FIELDS[:4]))
     for complaint in index.complaints:
         print(one_line(complaint), file=sys.stderr)
     return OK
@@ -65,9 +64,8 @@ def _parts(loader: "PluginLoader", name: str) -> Iterator[dict[str, Any]]:
     from mauve_rt.model.plugins import KINDS  # noqa: PLC0415
 
     registry = loader.registry
-    for kind in [kind for kind in KINDS if loader.has(kind, name)] or [
-        "core"
-    ]:  # which then says what is near
+    kinds = [kind for kind in KINDS if loader.has(kind, name)]
+    for kind in kinds or ["core"]:  # which then says what is near
         loader.require(kind, name)
         part: dict[str, Any] = {"kind": kind, "name": name}
         if kind == "core":
@@ -80,8 +78,8 @@ def _parts(loader: "PluginLoader", name: str) -> Iterator[dict[str, Any]]:
         if kind == "fsm":
             part |= {"states": [_state(each) for each in registry.describe_fsm(name)]}
         elif kind == "resource":
-            properties = [_parameter(each) for each in registry.resource_kind(name).parameters]
-            part |= {"parameters": properties}
+            given = registry.resource_kind(name).parameters
+            part |= {"parameters": [_setting(one, None if one.required else one.initial) for one in given]}
         elif kind == "type":
             size = next(shape.bytes for shape in registry.type_shapes() if shape.type == name)
             part |= {"bytes": size, "capacities": registry.sequences(name)}
@@ -93,27 +91,15 @@ def _shell(shell: "ShellDescription") -> dict[str, Any]:
         {"name": port.name, "kind": port.kind, "type": port.type, "required": port.required}
         for port in shell.ports
     ]
-    return {"ports": ports, "properties": [_property(each) for each in shell.properties]}
+    properties = [_setting(one, one.value) | {"read once by": one.structural} for one in shell.properties]
+    return {"ports": ports, "properties": properties}
 
 
-def _property(one: "PropertyDescription") -> dict[str, Any]:
+def _setting(one: "PropertyDescription | ResourceParameter", default: Any) -> dict[str, Any]:
     return {
         "name": one.name,
         "type": one.type,
-        "default": one.value,
-        "unit": one.unit,
-        "minimum": one.minimum,
-        "maximum": one.maximum,
-        "description": one.description,
-        "read once by": one.structural,
-    }
-
-
-def _parameter(one: Any) -> dict[str, Any]:
-    return {
-        "name": one.name,
-        "type": one.type,
-        "default": None if one.required else one.initial,
+        "default": default,
         "unit": one.unit,
         "minimum": one.minimum,
         "maximum": one.maximum,
@@ -139,6 +125,7 @@ def _state(state: "DescribedState") -> dict[str, Any]:
 
 
 def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
+    from mauve_rt.cli.tables import dict_table  # noqa: PLC0415 - rich takes its time to load
     from mauve_rt.cli.views import console, duration  # noqa: PLC0415
 
     out = console()
@@ -149,11 +136,11 @@ def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
             rows = [
                 each | {"port": each["name"], "": "" if each["required"] else "optional"} for each in ports
             ]
-            out.print(_table(rows, ("port", "kind", "type", "")))
+            out.print(dict_table(rows, ("port", "kind", "type", "")))
         if settings := part.get("properties", part.get("parameters")):
             head = "property" if "properties" in part else "parameter"
             rows = [{head: each["name"], "range": _range(each)} | each for each in settings]
-            out.print(_table(rows, (head, "type", "default", "unit", "range", "description")))
+            out.print(dict_table(rows, (head, "type", "default", "unit", "range", "description")))
         if states := part.get("states"):
             rows = [
                 {"state": each["name"] + (" (initial)" if each["initial"] else "")}
@@ -161,7 +148,7 @@ def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
                 | {"time": duration(each["duration_ns"] or 0), "next": ", ".join(each["next"])}
                 for each in states
             ]
-            out.print(_table(rows, ("state", "kind", "time", "next")))
+            out.print(dict_table(rows, ("state", "kind", "time", "next")))
         if "bytes" in part:
             lists = ", ".join(part["capacities"])
             out.print(
@@ -176,14 +163,3 @@ def _range(setting: Mapping[str, Any]) -> str:
     if most is None:
         return f">= {least:g}"
     return f"<= {most:g}" if least is None else f"{least:g} to {most:g}"
-
-
-def _table(rows: Iterable[Mapping[str, Any]], columns: Iterable[str]) -> "Table":
-    from rich import box  # noqa: PLC0415 - takes its time to load
-    from rich.table import Table  # noqa: PLC0415
-
-    columns = list(columns)
-    table = Table(*columns, box=box.SIMPLE_HEAD, pad_edge=False)
-    for row in rows:
-        table.add_row(*("" if row[column] is None else str(row[column]) for column in columns))
-    return table

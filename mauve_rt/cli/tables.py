@@ -1,6 +1,7 @@
 """Tables with numbers: what is folded in a narrow terminal are words, never a number or its unit."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from rich import box
 from rich.console import Console, Group
@@ -21,6 +22,14 @@ def number_table(names: Sequence[str], words: Sequence[str], numbers: Sequence[s
         table.add_column(name, overflow="fold")
     for name in numbers:
         table.add_column(name, justify="right", no_wrap=True)
+    return table
+
+
+def dict_table(rows: Iterable[Mapping[str, Any]], columns: Sequence[str]) -> Table:
+    """Return a table of these keys of each row; None is empty."""
+    table = Table(*columns, box=box.SIMPLE_HEAD, pad_edge=False)
+    for row in rows:
+        table.add_row(*("" if row[column] is None else str(row[column]) for column in columns))
     return table
 
 

@@ -99,12 +99,8 @@ def _lines(fields: "Collection[FieldShape]", indent: str = "  ") -> Iterator[str
 
 
 def _print_table(rows: Collection[dict[str, Any]]) -> None:
-    from rich import box  # noqa: PLC0415 - takes its time to load
-    from rich.table import Table  # noqa: PLC0415
-
+    from mauve_rt.cli.tables import dict_table  # noqa: PLC0415 - rich takes its time to load
     from mauve_rt.cli.views import console  # noqa: PLC0415
 
-    table = Table("type", "bytes", "capacities", "library", box=box.SIMPLE_HEAD, pad_edge=False)
-    for row in rows:
-        table.add_row(row["type"], f"{row['bytes']:,}", ", ".join(row["capacities"]), row["library"])
-    console().print(table)
+    shown = [row | {"bytes": f"{row['bytes']:,}", "capacities": ", ".join(row["capacities"])} for row in rows]
+    console().print(dict_table(shown, ("type", "bytes", "capacities", "library")))

@@ -34,7 +34,7 @@ LISTENER = {
   <name>a_listener</name>
   <version>0.1.0</version>
   <description>Reads an executor's state</description>
-  <maintainer email="nobody@example.invalid">Nobody</maintainer>
+  <maintainer email="you@example.invalid">You</maintainer>
   <license>Apache-2.0</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <depend>mauve_rt</depend>

@@ -62,7 +62,7 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
   <name>odd</name>
   <version>0.1.0</version>
   <description>Structs that are messages</description>
-  <maintainer email="nobody@example.invalid">Nobody</maintainer>
+  <maintainer email="you@example.invalid">You</maintainer>
   <license>Apache-2.0</license>
   <member_of_group>rosidl_interface_packages</member_of_group>
 </package>

@@ -293,7 +293,7 @@ def test_interfaces_of_the_same_package_are_found(tmp_path: Path) -> None:
   <name>odd_interfaces</name>
   <version>0.1.0</version>
   <description>A message and the structs of it</description>
-  <maintainer email="nobody@example.invalid">Nobody</maintainer>
+  <maintainer email="you@example.invalid">You</maintainer>
   <license>Apache-2.0</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <buildtool_depend>rosidl_default_generators</buildtool_depend>

@@ -24,7 +24,7 @@ PACKAGE = {
   <name>on_top</name>
   <version>0.1.0</version>
   <description>Has nothing</description>
-  <maintainer email="nobody@example.invalid">Nobody</maintainer>
+  <maintainer email="you@example.invalid">You</maintainer>
   <license>Apache-2.0</license>
   <buildtool_depend>ament_cmake</buildtool_depend>
   <export><build_type>ament_cmake</build_type></export>
