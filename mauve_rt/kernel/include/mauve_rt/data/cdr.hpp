@@ -2,6 +2,7 @@
 // Plain little-endian CDR, the wire format of ROS 2 messages, for structs that declare their fields once.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <concepts>
@@ -108,7 +109,9 @@ class CdrWriter {
   }
   void append(const void* data, std::size_t size) {
     const auto* bytes = static_cast<const std::byte*>(data);
-    buffer_.insert(buffer_.end(), bytes, bytes + size);
+    const std::size_t begin = buffer_.size();
+    buffer_.resize(begin + size);  // GCC 12 takes an insert() for a write out of bounds
+    std::copy_n(bytes, size, buffer_.data() + begin);
   }
 
   std::vector<std::byte>& buffer_;
