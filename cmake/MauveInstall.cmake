@@ -1,6 +1,9 @@
 # What ROS 2 and Python need of mauve_rt besides the kernel.
 
 mauve_install_python_package(mauve_rt)
+set(_templates "${PYTHON_INSTALL_DIR}/mauve_rt/scaffold/templates") # of `mauve new`
+install(DIRECTORY mauve_rt/scaffold/templates/ DESTINATION "${_templates}")
+mauve_link_installed("${PROJECT_SOURCE_DIR}/mauve_rt/scaffold/templates" "${_templates}")
 mauve_register_package(mauve_rt)
 install(FILES package.xml DESTINATION share/mauve_rt)
 install(FILES mauve_rt/node/shared/local.xml mauve_rt/node/shared/local_udp.xml mauve_rt/node/shared/open.xml

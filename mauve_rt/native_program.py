@@ -10,12 +10,16 @@ from pathlib import Path
 _NO_END = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGUSR1, signal.SIGUSR2)
 
 
-def native_program(name: str) -> Path:
-    """Where a program is installed: in the prefix that has the native modules."""
+def native_prefix() -> Path:
+    """Where MAUVE RT is installed: the prefix that has the native modules."""
     spec = find_spec("mauve_rt._kernel")
     native = Path(__file__ if spec is None or spec.origin is None else spec.origin)
-    prefix = native.resolve().parents[4]  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/
-    return prefix / "libexec" / "mauve_rt" / name
+    return native.resolve().parents[4]  # PREFIX/lib/pythonX.Y/site-packages/mauve_rt/
+
+
+def native_program(name: str) -> Path:
+    """Where a program is installed."""
+    return native_prefix() / "libexec" / "mauve_rt" / name
 
 
 def start_native_program(

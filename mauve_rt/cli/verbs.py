@@ -7,14 +7,17 @@ from typing import Any
 
 from mauve_rt.cli import (
     analyze_verb,
+    build_verb,
     changes_verb,
     check_verb,
     dev_verb,
     echo_verb,
     mirror_verb,
+    new_verb,
     plugins_verb,
     report_verb,
     rules_verb,
+    run_verb,
     shadow_verb,
     trace_verb,
     types_verb,
@@ -452,6 +455,9 @@ def _add_json(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = (
+    Verb("new", "write a package, or a part of one", new_verb.add_arguments, new_verb.main),
+    Verb("build", "build and install a package", build_verb.add_arguments, build_verb.main),
+    Verb("run", "run the executor of a package's architecture", run_verb.add_arguments, run_verb.main),
     Verb("list", "show the components of an executor", add_executor_and_json, _list),
     Verb("stop", "stop a component", _add_stop, _stop),
     Verb("start", "start a stopped component", _add_start, _start),

@@ -23,6 +23,7 @@ MODULES = {
     "elftools": ("", "pyelftools"),
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
+    "jinja2": ("python3-jinja2", "jinja2"),
     "lz4": ("", "mcap"),  # comes with it
     "markdown_it": ("", "rich"),  # comes with it
     "mcap": ("", "mcap"),
