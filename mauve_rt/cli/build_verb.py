@@ -65,6 +65,7 @@ def _cmake(package: "Package", build_type: str, *, test: bool) -> Iterator[_Comm
         f"-DCMAKE_BUILD_TYPE={build_type}",
         f"-DCMAKE_INSTALL_PREFIX={package.prefixes[0]}",
         f"-DPython3_EXECUTABLE={sys.executable}",
+        "-DCMAKE_INSTALL_MESSAGE=LAZY",
     ]
     yield ["cmake", "--build", package.build, "--parallel", str(os.cpu_count() or 1)]
     yield ["cmake", "--install", package.build]

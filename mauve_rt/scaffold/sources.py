@@ -52,6 +52,7 @@ class Replaceable:
 
     component: str
     core: str
+    is_python: bool
 
 
 def architectures(package: Path) -> list[Path]:
@@ -60,16 +61,18 @@ def architectures(package: Path) -> list[Path]:
 
 
 def replaceable(architecture: Path) -> Iterator[Replaceable]:
-    """The components that have alternatives, with the first one of each.
+    """The components of a package's file that have alternatives, with the first one of each.
 
     Raises:
         ArchitectureFileError: the file cannot be read.
     """
+    lists = sorted(architecture.absolute().parents[1].glob("plugins/*.txt"))
+    in_python = "".join(path.read_text(encoding="utf-8") for path in lists)
     components = YamlFile(architecture).data["components"]
     for name, component in components.items() if isinstance(components, dict) else ():
         others = component.get("alternatives") if isinstance(component, dict) else None
         if isinstance(others, list) and others:
-            yield Replaceable(str(name), str(others[0]))
+            yield Replaceable(str(name), str(others[0]), is_python=f"; {others[0]};" in in_python)
 
 
 def target_of(package: Path) -> Replaceable:
