@@ -74,9 +74,10 @@ def _cmake(package: "Package", build_type: str, *, test: bool) -> Iterator[_Comm
 
 
 def _colcon(package: "Package", build_type: str, *, test: bool) -> Iterator[_Command]:
+    links = ["--symlink-install"] if package.is_linked else []
     # The type of the build is for this package only.
-    yield ["colcon", "build", "--packages-up-to", package.name, "--packages-skip", package.name]
+    yield ["colcon", "build", *links, "--packages-up-to", package.name, "--packages-skip", package.name]
     only: _Command = ["--packages-select", package.name]
-    yield ["colcon", "build", *only, "--cmake-args", f"-DCMAKE_BUILD_TYPE={build_type}"]
+    yield ["colcon", "build", *links, *only, "--cmake-args", f"-DCMAKE_BUILD_TYPE={build_type}"]
     if test:
         yield ["colcon", "test", *only, "--event-handlers", "console_direct+", "--return-code-on-test-failure"]

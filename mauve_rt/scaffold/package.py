@@ -1,5 +1,6 @@
 """A package of a user on the disk: where it is, by what it is built, and where it is installed."""
 
+import re
 import shutil
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
@@ -8,6 +9,7 @@ from pathlib import Path
 from mauve_rt.errors import ParameterError
 
 _FILE = "package.xml"
+_LINKED = re.compile(r"^AMENT_CMAKE_SYMLINK_INSTALL:\w+=(1|ON|TRUE)$", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,12 @@ class Package:
         raise ParameterError(
             f"package {self.name}: expected it installed in {self.prefixes[0]}, found nothing. Call mauve build."
         )
+
+    @property
+    def is_linked(self) -> bool:
+        """Whether the workspace was built with --symlink-install: a build without it fails there."""
+        caches = self.workspace.glob("build/*/CMakeCache.txt") if self.workspace else ()
+        return any(_LINKED.search(cache.read_text(encoding="utf-8", errors="replace")) for cache in caches)
 
     @property
     def share(self) -> Path:
