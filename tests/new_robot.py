@@ -1,4 +1,4 @@
-"""A robot of `mauve new package`, as its user brings it to the first live swap: for the stages ros and doors."""
+"""A robot of `mauve new package`, brought to its first live swap: for the stages ros and doors."""
 
 import os
 import signal
@@ -15,7 +15,9 @@ PATIENCE_S = 100.0
 class NewRobot:
     """A package that is written now, and commands that are typed in it."""
 
-    def __init__(self, folder: Path, name: str, *options: str, environment: Mapping[str, str], mauve: str) -> None:
+    def __init__(
+        self, folder: Path, name: str, *options: str, environment: Mapping[str, str], mauve: str
+    ) -> None:
         self.folder = folder / name
         self._name = name
         self._mauve = mauve
@@ -67,7 +69,9 @@ class NewRobot:
 
     def _is_seen(self) -> bool:
         command = [self._mauve, "nodes"]
-        return subprocess.run(command, env=self._environment, capture_output=True, check=False).returncode == 0
+        return (
+            subprocess.run(command, env=self._environment, capture_output=True, check=False).returncode == 0
+        )
 
     def swap(self) -> float:
         """Replace the core of the robot that runs; returns the seconds since its package was begun."""
@@ -76,7 +80,7 @@ class NewRobot:
         assert f"component 'drive' runs {self._name}/Halt, before {self._name}/Drive" in said
         assert "missed releases 0" in said
         assert "took over position" in said
-        print(f"{seconds:.1f} s from `mauve new` to the swap, {os.cpu_count()} CPUs")
+        print(f"{seconds:.1f} s from `mauve new` to the swap, {os.cpu_count()} CPUs")  # noqa: T201 - for the log of the stage
         return seconds
 
     def wait_for_core(self, core: str) -> None:

@@ -50,9 +50,14 @@ def main(args: argparse.Namespace) -> int:
             print(f"mauve: {words[0]} is not installed; install it (apt install {words[0]})", file=sys.stderr)
             return BAD_USAGE
         if done.returncode:
-            return done.returncode if done.returncode > 0 else 128 - done.returncode  # a signal, as shells say it
+            return (
+                done.returncode if done.returncode > 0 else 128 - done.returncode
+            )  # a signal, as shells say it
     setup = package.prefixes[-1] / "setup.bash" if package.workspace else package.share / "local_setup.bash"
-    print(f"mauve: mauve run starts it. For all other commands: source {shlex.quote(str(setup))}", file=sys.stderr)
+    print(
+        f"mauve: mauve run starts it. For all other commands: source {shlex.quote(str(setup))}",
+        file=sys.stderr,
+    )
     return OK
 
 
@@ -80,4 +85,11 @@ def _colcon(package: "Package", build_type: str, *, test: bool) -> Iterator[_Com
     only: _Command = ["--packages-select", package.name]
     yield ["colcon", "build", *links, *only, "--cmake-args", f"-DCMAKE_BUILD_TYPE={build_type}"]
     if test:
-        yield ["colcon", "test", *only, "--event-handlers", "console_direct+", "--return-code-on-test-failure"]
+        yield [
+            "colcon",
+            "test",
+            *only,
+            "--event-handlers",
+            "console_direct+",
+            "--return-code-on-test-failure",
+        ]

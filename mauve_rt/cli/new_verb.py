@@ -78,7 +78,10 @@ def _write_package(args: argparse.Namespace) -> Iterator[Path]:
 
     check_package(args.name)
     if (there := share_folder(args.name)) is not None:
-        print(f"mauve: a package {args.name} is installed in {there}: the one that is found first counts", file=sys.stderr)
+        print(
+            f"mauve: a package {args.name} is installed in {there}: the one that is found first counts",
+            file=sys.stderr,
+        )
     begin, begin_file = part_names(_BEGIN)
     other, other_file = part_names(_OTHER)
     shell, ports = f"{begin}Shell", (Port("position", "write", "Float64"),)

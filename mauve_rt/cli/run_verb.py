@@ -1,4 +1,4 @@
-"""`mauve run`: becomes the executor of a package's architecture, in an environment in which the package is found."""
+"""`mauve run`: becomes the executor of a package's architecture, in an environment that has the package."""
 
 import argparse
 import os
@@ -22,7 +22,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         default="",
         metavar="ARCH",
-        help="architecture file, or the name of one in the package's folder architecture/ (default: the only one)",
+        help="architecture file, or the name of one of the package's (default: the only one)",
     )
     parser.add_argument("--rules", default="", metavar="FILE", help="rules file of the executor")
     parser.add_argument("--bag", default="", metavar="FOLDER", help="record into a new bag")

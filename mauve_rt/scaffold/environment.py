@@ -1,4 +1,4 @@
-"""The paths by which tools and executors find MAUVE RT, and packages that are installed into folders of their own."""
+"""The paths by which tools find MAUVE RT, and executors the packages of users."""
 
 import os
 import sys

@@ -7,17 +7,18 @@ from mauve_rt.errors import ParameterError
 
 _PACKAGE = re.compile(r"[a-z](?:_?[a-z0-9])+")
 _PART = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*")
-_CPP = frozenset(
-    "alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t char32_t class "
-    "co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue decltype "
-    "default delete do double dynamic_cast else enum explicit export extern false float for friend goto if inline "
-    "int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private protected public register "
-    "reinterpret_cast requires return short signed sizeof static static_assert static_cast struct switch template "
-    "this thread_local throw true try typedef typeid typename union unsigned using virtual void volatile wchar_t "
-    "while xor xor_eq".split()
-)
+_KEYWORDS_OF_CPP = """
+alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t
+class co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue
+decltype default delete do double dynamic_cast else enum explicit export extern false float for friend
+goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private
+protected public register reinterpret_cast requires return short signed sizeof static static_assert
+static_cast struct switch template this thread_local throw true try typedef typeid typename union
+unsigned using virtual void volatile wchar_t while xor xor_eq
+"""
+_CPP = frozenset(_KEYWORDS_OF_CPP.split())
 # A package is a C++ namespace, a Python module and a CMake project: names that one of these has already.
-_TAKEN = frozenset("all clean help install mauve package std test".split())
+_TAKEN = frozenset({"all", "clean", "help", "install", "mauve", "package", "std", "test"})
 
 
 def check_package(name: str) -> None:
@@ -35,7 +36,9 @@ def check_package(name: str) -> None:
             f"found '{name}'. Choose a name such as {remedy}."
         )
     if name in _TAKEN:
-        raise ParameterError(f"package name: '{name}' has a meaning of its own in CMake or C++. Choose another name.")
+        raise ParameterError(
+            f"package name: '{name}' has a meaning of its own in CMake or C++. Choose another name."
+        )
     _check_keyword(name, "package name")
 
 
@@ -64,4 +67,6 @@ def _check_keyword(name: str, what: str) -> None:
         if is_one
     ]
     if languages:
-        raise ParameterError(f"{what}: '{name}' is a keyword of {' and '.join(languages)}. Choose another name.")
+        raise ParameterError(
+            f"{what}: '{name}' is a keyword of {' and '.join(languages)}. Choose another name."
+        )

@@ -44,7 +44,8 @@ class Package:
             if (self._share(prefix) / _FILE).exists():
                 return prefix
         raise ParameterError(
-            f"package {self.name}: expected it installed in {self.prefixes[0]}, found nothing. Call mauve build."
+            f"package {self.name}: expected it installed in {self.prefixes[0]}, found nothing. "
+            "Call mauve build."
         )
 
     @property

@@ -25,9 +25,9 @@ def render(kind: str, values: Mapping[str, Any]) -> dict[Path, str]:
     )
     folder = _TEMPLATES / kind
     return {
-        Path(environment.from_string(str(file.relative_to(folder).with_suffix(""))).render(values)): environment.from_string(
-            file.read_text(encoding="utf-8")
-        ).render(values)
+        Path(
+            environment.from_string(str(file.relative_to(folder).with_suffix(""))).render(values)
+        ): environment.from_string(file.read_text(encoding="utf-8")).render(values)
         for file in sorted(folder.rglob("*.j2"))
     }
 
@@ -76,7 +76,9 @@ def write_parts(package: Path, files: Mapping[Path, str]) -> list[Path]:
 
 def _exists(paths: Iterable[Path]) -> ParameterError:
     names = ", ".join(map(str, paths))
-    return ParameterError(f"{names}: exists already, and nothing was written. Choose another name, or remove it.")
+    return ParameterError(
+        f"{names}: exists already, and nothing was written. Choose another name, or remove it."
+    )
 
 
 def _write(folder: Path, files: Mapping[Path, str]) -> None:

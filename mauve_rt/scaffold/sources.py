@@ -12,10 +12,15 @@ from mauve_rt.errors import ArchitectureFileError, ParameterError
 from mauve_rt.model.file_kinds import FileKind, file_kind
 from mauve_rt.model.yaml_file import YamlFile
 
-_CPP_SHELL = re.compile(r"\b(?:struct|class)\s+(\w+)\s*(?:final\s*)?:\s*(?:public\s+)?[\w:]*Shell\b[^{]*\{(.*?)^\};", re.M | re.S)
-_CPP_CORE = re.compile(r"\b(?:struct|class)\s+(\w+)\s*(final\s*)?:\s*(?:public\s+)?(?:mauve::)?UpdateCore<(\w+)>")
+_CPP_SHELL = re.compile(
+    r"\b(?:struct|class)\s+(\w+)\s*(?:final\s*)?:\s*(?:public\s+)?[\w:]*Shell\b[^{]*\{(.*?)^\};",
+    re.MULTILINE | re.DOTALL,
+)
+_CPP_CORE = re.compile(
+    r"\b(?:struct|class)\s+(\w+)\s*(final\s*)?:\s*(?:public\s+)?(?:mauve::)?UpdateCore<(\w+)>"
+)
 _CPP_PORT = re.compile(r"\b(read|write)_port<([\w:]+)>\(\"(\w+)\"")
-_PYTHON_CORE = re.compile(r"^class\s+(\w+)\(Core\[(\w+)\]\)", re.M)
+_PYTHON_CORE = re.compile(r"^class\s+(\w+)\(Core\[(\w+)\]\)", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -103,16 +108,18 @@ def base_of(package: Path, name: str, wanted: str, *, in_python: bool) -> Base:
         found = [each for each in found if wanted.rpartition("/")[2] in (each.shell, each.core, each.file)]
         if not found:
             raise ParameterError(
-                f"--for {wanted}: expected a shell or core of {name}{_languages(in_python)}, found {_list(names)}."
+                f"--for {wanted}: expected a shell or core of {name}{_languages(in_python)}, "
+                f"found {_list(names)}. Choose one of these."
             )
     if len({each.shell for each in found}) != 1:
         raise ParameterError(
             f"core: expected one shell in {name}{_languages(in_python)}, found {_list(names)}. "
             + ("Choose one with --for SHELL." if found else "Add one with mauve new component.")
         )
-    base = found[0]
-    # A core in Python cannot derive from one in C++.
-    return replace(base, parent="Core") if in_python and not base.is_python else base
+    base: Base = found[0]
+    if in_python and not base.is_python:
+        base = replace(base, parent="Core")  # a class in Python cannot derive from one in C++
+    return base
 
 
 def cpp_base(core: str, shell: str, file: str, ports: tuple[Port, ...], *, is_final: bool = False) -> Base:
@@ -142,7 +149,10 @@ def _is_architecture(path: Path) -> bool:
 
 
 def _cpp_cores(package: Path) -> Iterator[Base]:
-    texts = {path: _without_comments(path.read_text(encoding="utf-8")) for path in sorted(package.glob("src/*.hpp"))}
+    texts = {
+        path: _without_comments(path.read_text(encoding="utf-8"))
+        for path in sorted(package.glob("src/*.hpp"))
+    }
     shells = {name: (path, body) for path, text in texts.items() for name, body in _CPP_SHELL.findall(text)}
     cores = [
         cpp_base(core, shell, path.stem, _ports(shells[shell][1]), is_final=bool(final))
@@ -159,13 +169,15 @@ def _ports(body: str) -> tuple[Port, ...]:
 
 
 def _without_comments(text: str) -> str:
-    return re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.S)
+    return re.sub(r"//[^\n]*|/\*.*?\*/", "", text, flags=re.DOTALL)
 
 
 def _python_cores(package: Path, name: str) -> Iterator[Base]:
     texts = {path: path.read_text(encoding="utf-8") for path in sorted(package.glob(f"{name}_parts/*.py"))}
     cores = [
-        (path, text, core, shell) for path, text in texts.items() for core, shell in _PYTHON_CORE.findall(text)
+        (path, text, core, shell)
+        for path, text in texts.items()
+        for core, shell in _PYTHON_CORE.findall(text)
     ]
     for path, _, core, shell in sorted(cores, key=lambda each: f"class {each[3]}(" not in each[1]):
         yield python_base(core, shell, path.stem)

@@ -2,14 +2,17 @@
 
 import json
 import os
+import random
 import re
 import shutil
 import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from doors import (
     ALL_JOBS,
+    DOMAINS,
     LEAN_BUILD,
     NINJA,
     ROOT,
@@ -19,6 +22,7 @@ from doors import (
     run,
     shell_without,
 )
+from new_robot import NewRobot
 
 from mauve_rt import _kernel
 
@@ -166,6 +170,21 @@ def test_downstream_core_replaces_a_running_one(
         assert plugin.resolve() in libraries  # ament_cmake links it to where it was built
         assert all(library.is_relative_to(install) for library in libraries - {plugin.resolve()})
         assert executor.interrupt() == 0, executor.output
+
+
+def test_a_new_package_runs_to_its_first_swap_in_a_workspace(
+    workspace: Path, sourced: dict[str, str], record_property: Callable[[str, object], None]
+) -> None:
+    mauve = shutil.which("mauve", path=sourced["PATH"]) or ""
+    domain = {"ROS_DOMAIN_ID": str(random.choice(DOMAINS))}  # noqa: S311
+    environment = sourced | ALL_JOBS | NINJA | domain
+    robot = NewRobot(workspace / "src", "my_robot", environment=environment, mauve=mauve)
+    said = robot.build()
+    assert "mauve: colcon build --symlink-install --packages-select my_robot" in said
+    assert (workspace / "install/my_robot/share/my_robot/architecture/robot.yaml").is_file()
+    with robot.running():
+        record_property("seconds_to_the_swap", robot.swap())
+    assert "100% tests passed" in robot.build("--test")
 
 
 @pytest.mark.parametrize(

@@ -60,7 +60,9 @@ def test_a_new_package_in_python_runs_to_its_first_swap_and_takes_all_parts(
     prefix = robot.folder / "install"
     index = (prefix / "share/ament_index/resource_index/mauve_rt_plugins/py_robot").read_text("utf-8")
     names = {line.split("; ")[1] for line in index.splitlines()}
-    assert {f"py_robot/{name}" for name in ("LiftArm", "Fast", "Soft", "EyeFsm", "Blink", "Tally", "Notes")} <= names
+    assert {
+        f"py_robot/{name}" for name in ("LiftArm", "Fast", "Soft", "EyeFsm", "Blink", "Tally", "Notes")
+    } <= names
     assert (prefix / "share/py_robot/msg/Leg.msg").exists()
 
 

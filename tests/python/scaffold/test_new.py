@@ -50,7 +50,9 @@ def test_a_package_name_of_ros_is_taken(name: str) -> None:
         ("lambda", "keyword of Python"),
     ],
 )
-def test_a_bad_package_name_is_refused(name: str, said: str, here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bad_package_name_is_refused(
+    name: str, said: str, here: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["new", "package", name]) == 2
     assert said in capsys.readouterr().err
     assert not list(here.iterdir())
@@ -116,7 +118,12 @@ def test_new_parts_change_no_file(here: Path) -> None:
         assert main(["new", *words]) == 0
     after = files(here / "robot_1")
     assert before.items() <= after.items()
-    assert {"msg/Leg.msg", "src/slow.cpp", "plugins/slower.txt", "architecture/repair_rules.yaml"} <= after.keys()
+    assert {
+        "msg/Leg.msg",
+        "src/slow.cpp",
+        "plugins/slower.txt",
+        "architecture/repair_rules.yaml",
+    } <= after.keys()
 
 
 def test_files_in_python_compile(here: Path) -> None:
@@ -146,7 +153,9 @@ def test_a_core_derives_from_the_one_that_it_replaces_if_that_can_be(here: Path)
     header.write_text(header.read_text().replace("class Drive :", "class Drive final :"))
     main(["new", "core", "slow", "--in", "robot_1"])
     assert "class Fast : public Drive {" in (here / "robot_1/src/fast.hpp").read_text()
-    assert "class Slow : public mauve::UpdateCore<DriveShell> {" in (here / "robot_1/src/slow.hpp").read_text()
+    assert (
+        "class Slow : public mauve::UpdateCore<DriveShell> {" in (here / "robot_1/src/slow.hpp").read_text()
+    )
 
 
 def test_without_a_package_the_remedy_is_said(capsys: pytest.CaptureFixture[str]) -> None:
@@ -155,7 +164,9 @@ def test_without_a_package_the_remedy_is_said(capsys: pytest.CaptureFixture[str]
         assert "Go to a package, or write one with mauve new package NAME." in capsys.readouterr().err
 
 
-def test_colcon_builds_in_a_workspace_and_cmake_elsewhere(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_colcon_builds_in_a_workspace_and_cmake_elsewhere(
+    here: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (here / "ws/src").mkdir(parents=True)
     main(["new", "package", "robot_1"])
     shutil.copytree("robot_1", "ws/src/robot_1")
@@ -171,7 +182,7 @@ def test_colcon_builds_in_a_workspace_and_cmake_elsewhere(here: Path, monkeypatc
     cache.parent.mkdir(parents=True)
     cache.write_text("AMENT_CMAKE_SYMLINK_INSTALL:UNINITIALIZED=1\n")
     assert all("--symlink-install" in each for each in [*build_verb._colcon(package, "Release", test=False)])
-    monkeypatch.setattr(shutil, "which", lambda program: None)
+    monkeypatch.setattr(shutil, "which", lambda _: None)
     assert find_package(here / "ws/src/robot_1").workspace is None
 
 
