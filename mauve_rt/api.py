@@ -12,6 +12,7 @@ from mauve_rt._kernel import (
     Component,
     ComponentDescription,
     Deployer,
+    Duration,
     ExecutionTimeDescription,
     Host,
     MauveError,
@@ -32,7 +33,7 @@ from mauve_rt._kernel import (
 from mauve_rt.model.build import open_architecture
 from mauve_rt.parts.cores import Core
 from mauve_rt.parts.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
-from mauve_rt.parts.fsms import Fsm, State
+from mauve_rt.parts.fsms import Fsm, State, times
 from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, Sample, WritePort
 from mauve_rt.parts.resources import (
     AnyResource,
@@ -59,6 +60,7 @@ __all__ = [
     "ComponentDescription",
     "Core",
     "Deployer",
+    "Duration",
     "EventCounter",
     "EventPort",
     "ExecutionTimeDescription",
@@ -99,6 +101,7 @@ __all__ = [
     "read_resource",
     "s_to_ns",
     "service",
+    "times",
     "us_to_ns",
     "write_port",
 ]

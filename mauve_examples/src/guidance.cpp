@@ -43,13 +43,12 @@ void GuidanceCore::write_target() {
 }
 
 void GuidanceFsm::define() {
-  const mauve::time_ns_t unit_ns = mauve::ms_to_ns(shell().unit_ms);
   mauve::State& idle = execution("Idle", "read_inputs", &GuidanceCore::read_inputs);
   mauve::State& planning = execution("Planning", "compute_path", &GuidanceCore::compute_path);
   mauve::State& following = execution("Following", "follow_path", &GuidanceCore::follow_path);
-  mauve::State& w1 = wait("W1", unit_ns);
-  mauve::State& w2 = wait("W2", 2 * unit_ns);
-  mauve::State& w3 = wait("W3", 5 * unit_ns);
+  mauve::State& w1 = wait("W1", mauve::times(1, shell().unit_ms));
+  mauve::State& w2 = wait("W2", mauve::times(2, shell().unit_ms));
+  mauve::State& w3 = wait("W3", mauve::times(5, shell().unit_ms));
 
   set_initial(idle);
   transition(idle, "has_new_goal", &GuidanceCore::has_new_goal, planning);

@@ -14,6 +14,8 @@ class ExecutionTime:
 
     ns: int | None = None
     origin: str = "missing"
+    why_missing: str = ""
+    """Empty: nothing declares a part of it."""
 
     def __str__(self) -> str:
         """As `0.200 ms, declared`."""
@@ -52,11 +54,17 @@ class State:
 
 
 def _declared_time(told: Any) -> ExecutionTime:
-    """The worst case, which a bag of an earlier version lacks; else the bound that is enforced."""
+    """The worst case, which a bag of an earlier version lacks; else the bound that is enforced.
+
+    Only a DescribedState names the core that declares it; a StateInfo has the time alone.
+    """
+    core = getattr(told, "wcet_core", "")
     if wcet_ns := int(getattr(told, "wcet_ns", 0)):
-        return ExecutionTime(wcet_ns, "declared")
+        return ExecutionTime(wcet_ns, f"declared by core {core}" if core else "declared")
     if bound_ns := int(told.max_execution_ns):
         return ExecutionTime(bound_ns, "declared (its bound)")
+    if methods := getattr(told, "methods_without_wcet", ()):
+        return ExecutionTime(why_missing=f"core {core} declares no time of {', '.join(methods)}")
     return ExecutionTime()
 
 

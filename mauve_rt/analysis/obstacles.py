@@ -27,7 +27,10 @@ def obstacles(machine: Machine, others: Sequence[Machine] = ()) -> Iterator[str]
     if not machine.states:
         yield "nothing tells its states: it is not configured, or was recorded by an earlier version"
     if machine.missing:
-        names = ", ".join(machine.missing)
+        states = (state for state in machine.states if state.name in machine.missing)
+        names = ", ".join(
+            f"{state.name} ({why})" if (why := state.time.why_missing) else state.name for state in states
+        )
         yield f"no time is known of {names}: declare wcet_ns, or measure (--budget-from BAG)"
     yield from _shared_with_other_cpus(machine, others)
 

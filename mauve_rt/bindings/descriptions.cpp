@@ -32,8 +32,18 @@ std::vector<PortDescription> describe_ports(const Shell& shell) {
   std::vector<PortDescription> ports;
   for (const auto& port : shell.ports()) {
     auto [resource, service, longest_hold_ns] = port->connected_to();
-    ports.push_back({port->name(), std::string(to_string(port->kind())), port->type(), std::move(resource),
-                     std::move(service), port->is_required(), port->messages(), longest_hold_ns});
+    const bool is_output = port->kind() == PortKind::write;
+    const auto policy = [&](OutputPolicy each) { return is_output ? std::string(to_string(each)) : ""; };
+    ports.push_back({.name = port->name(),
+                     .kind = std::string(to_string(port->kind())),
+                     .type = port->type(),
+                     .resource = std::move(resource),
+                     .service = std::move(service),
+                     .required = port->is_required(),
+                     .messages = port->messages(),
+                     .longest_hold_ns = longest_hold_ns,
+                     .on_commit = policy(port->output().on_commit),
+                     .on_stop = policy(port->output().on_stop)});
   }
   return ports;
 }
@@ -198,7 +208,11 @@ void bind_descriptions(py::module_& module) {
             return py::bytes(reinterpret_cast<const char*>(self.stop_message.data()),
                              self.stop_message.size());
           },
-          "What a stop writes, as a message; empty: nothing. Told of a component's connected ports.");
+          "What a stop writes, as a message; empty: nothing. Told of a component's connected ports.")
+      .def_readonly("on_commit", &PortDescription::on_commit,
+                    "Of a shell's write port: 'hold' or 'set_zero'; else ''.")
+      .def_readonly("on_stop", &PortDescription::on_stop,
+                    "Of a shell's write port: 'hold' or 'set_zero'; else ''.");
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
       .def_readonly("type", &PropertyDescription::type, "'bool', 'int', 'float', 'str'.")
@@ -223,6 +237,17 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("ports", &ShellDescription::ports)
       .def_readonly("properties", &ShellDescription::properties)
       .def_readonly("bytes", &ShellDescription::bytes, "Of its class; 0: not written in C++.");
+  py::class_<CoreDescription>(module, "CoreDescription", "What a registered core says of itself.")
+      .def_readonly("name", &CoreDescription::name)
+      .def_readonly("shell", &CoreDescription::shell, "Name of the shell that it was written for.")
+      .def_readonly("is_python", &CoreDescription::is_python, "Whether it is written in Python.")
+      .def_readonly("classes", &CoreDescription::classes, "As PluginRegistry.classes_of().")
+      .def_readonly("wcet_ns", &CoreDescription::wcet_ns,
+                    "The worst-case execution times of its methods, as far as they are declared.")
+      .def_readonly("budget_ns", &CoreDescription::budget_ns,
+                    "Of its adopt and take together; 0: not declared.")
+      .def_readonly("state_fields", &CoreDescription::state_fields,
+                    "Name and type of each field that a core which replaces it may take over.");
   py::class_<ServiceDescription>(module, "ServiceDescription")
       .def_readonly("name", &ServiceDescription::name)
       .def_readonly("kind", &ServiceDescription::kind,
@@ -255,7 +280,8 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("mean_ns", &E::mean_ns)
       .def_readonly("max_ns", &E::max_ns);
   using S = DescribedState;
-  py::class_<S>(module, "DescribedState", "A state of an fsm; fields as mauve_msgs/msg/StateInfo.")
+  py::class_<S>(module, "DescribedState",
+                "A state of an fsm; it has the fields of mauve_msgs/msg/StateInfo, and more.")
       .def_readonly("name", &S::name)
       .def_readonly("is_initial", &S::is_initial)
       .def_readonly("is_wait", &S::is_wait)
@@ -267,7 +293,18 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("simulated_execution_ns", &S::simulated_execution_ns, "What it takes in virtual time.")
       .def_readonly("successors", &S::successors,
                     "In the order in which guards are asked; last the one without a guard.")
-      .def_readonly("wcet_ns", &S::wcet_ns, "Of an execution state: its worst case; 0: not declared.");
+      .def_readonly("wcet_ns", &S::wcet_ns, "Of an execution state: its worst case; 0: not declared.")
+      .def_readonly("duration_text", &S::duration_text,
+                    "The expression of duration_ns, as '5 * unit_ms'; '': a plain number of ns.")
+      .def_readonly("min_interarrival_text", &S::min_interarrival_text,
+                    "The expression of min_interarrival_ns; '': a plain number of ns.")
+      .def_readonly("action", &S::action, "Of an execution state: the core's method that it runs.")
+      .def_readonly("guards", &S::guards, "The core's methods, one for each successor but the last.")
+      .def_readonly("event_port", &S::event_port, "Of an event wait.")
+      .def_readonly("wcet_core", &S::wcet_core,
+                    "The core that declares wcet_ns; '': the architecture file or the fsm does.")
+      .def_readonly("methods_without_wcet", &S::methods_without_wcet,
+                    "Of a core that declares times of other methods: wcet_ns is 0.");
   using C = ComponentDescription;
   py::class_<C>(module, "ComponentDescription", "A snapshot; fields as mauve_msgs/msg/ComponentInfo.")
       .def_readonly("name", &C::name)

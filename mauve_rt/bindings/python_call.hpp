@@ -78,6 +78,7 @@ class ShellView {
   py::object call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const;
   void raise_event(const std::string& name) const;
   py::object property(const std::string& name) const;
+  Duration times(std::int64_t factor, const std::string& property) const;
   std::vector<PortDescription> ports() const {
     const Shell& described = shell();
     const InterpreterUnlocked release;  // ports have locks of their own

@@ -141,9 +141,29 @@ py::object PythonCore::object_of(const CoreBase& core) {
   return python != nullptr && python->object_ ? python->object() : py::none();
 }
 
+CoreDescription describe_core(CoreBase& core, Shell& shell, const PluginRegistry& registry) {
+  if (!core.bind_shell(shell)) {
+    throw Error(ErrorCode::type_mismatch, "the core was written for another shell",
+                {.element = core.description(), .found = shell.implementation()});
+  }
+  CoreDescription description{.name = core.implementation(),
+                              .shell = shell.implementation(),
+                              .is_python = dynamic_cast<const PythonCore*>(&core) != nullptr,
+                              .classes = registry.classes_of("core", core.implementation()),
+                              .wcet_ns = core.wcet_ns(),
+                              .budget_ns = 0,
+                              .state_fields = {}};
+  for (const StateField& field : core.state_fields())
+    description.state_fields.emplace_back(field.name, field.type);
+  description.budget_ns =
+      core.budget_ns();  // a core in Python knows it once its object is made: state_fields()
+  return description;
+}
+
 std::unique_ptr<CoreBase> make_python_core(const PartFactory& factory) {
   auto core = std::make_unique<PythonCore>(factory.make);
   core->set_implementation(factory.name);
+  core->set_wcet_ns(factory.wcet_ns);
   core->set_factory([factory] { return make_python_core(factory); });
   return core;
 }

@@ -44,9 +44,9 @@ class PythonFsm final : public FsmBase {
     state.simulated_execution_ns = simulated_execution_ns;
     state.wcet_ns = wcet_ns;
   }
-  void add_wait(const std::string& name, time_ns_t duration_ns) { wait(name, duration_ns); }
-  void add_event_wait(const std::string& name, const std::string& port, time_ns_t timeout_ns,
-                      time_ns_t min_interarrival_ns) {
+  void add_wait(const std::string& name, const Duration& duration) { wait(name, duration); }
+  void add_event_wait(const std::string& name, const std::string& port, const Duration& timeout,
+                      const Duration& min_interarrival) {
     PortBase* found = link_->shell->find_port(port);
     if (found == nullptr) {
       throw Error(ErrorCode::unknown_port, "the shell has no such port",
@@ -54,7 +54,7 @@ class PythonFsm final : public FsmBase {
                    .expected = "a port of " + link_->shell->description(),
                    .found = port});
     }
-    wait_event(name, *found, timeout_ns, min_interarrival_ns);
+    wait_event(name, *found, timeout, min_interarrival);
   }
   void begin_with(const std::string& name) { set_initial(require(name)); }
   void go(const std::string& from, const std::string& to) { next(require(from), require(to)); }
@@ -113,9 +113,9 @@ void bind_python_fsm(py::module_& module) {
                         "Takes the declarations of a state machine written in Python; states by their names.")
       .def("execution", &PythonFsm::add_execution, py::arg("name"), py::arg("method"),
            py::arg("max_execution_ns"), py::arg("simulated_execution_ns"), py::arg("wcet_ns"))
-      .def("wait", &PythonFsm::add_wait, py::arg("name"), py::arg("duration_ns"))
-      .def("wait_event", &PythonFsm::add_event_wait, py::arg("name"), py::arg("port"), py::arg("timeout_ns"),
-           py::arg("min_interarrival_ns"))
+      .def("wait", &PythonFsm::add_wait, py::arg("name"), py::arg("duration"))
+      .def("wait_event", &PythonFsm::add_event_wait, py::arg("name"), py::arg("port"), py::arg("timeout"),
+           py::arg("min_interarrival"))
       .def("set_initial", &PythonFsm::begin_with, py::arg("state"))
       .def("next", &PythonFsm::go, py::arg("state"), py::arg("to"))
       .def("transition", &PythonFsm::go_if, py::arg("state"), py::arg("guard"), py::arg("to"));

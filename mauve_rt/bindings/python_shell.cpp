@@ -166,6 +166,12 @@ py::object ShellView::property(const std::string& name) const {
   return to_python(property->boxed());
 }
 
+Duration ShellView::times(std::int64_t factor, const std::string& property) const {
+  const PropertyBase* found = shell().find_property(property);
+  if (found == nullptr) throw py::key_error("the shell has no property '" + property + "'");
+  return mauve::times(factor, *found);
+}
+
 time_ns_t ShellView::clock() const {
   static_cast<void>(shell());
   return link_->context != nullptr ? link_->context->clock_ns.load(std::memory_order_relaxed)
@@ -189,6 +195,11 @@ std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const Plugi
 }
 
 void bind_python_shell(py::module_& module) {
+  py::class_<Duration>(module, "Duration",
+                       "A length of time that an fsm declares, with the expression it was computed from.")
+      .def(py::init<time_ns_t, std::string>(), py::arg("ns"), py::arg("text") = "")
+      .def_readonly("ns", &Duration::ns)
+      .def_readonly("text", &Duration::text, "As '5 * unit_ms'; '': a plain number of ns.");
   py::class_<ShellView>(
       module, "ShellView",
       R"(What a part written in Python reaches of its component's shell; messages in serialized form.
@@ -200,6 +211,8 @@ Raises MauveError (not_configured) once the component is gone.)")
       .def("call", &ShellView::call, py::arg("port"), "Calls a service in Python.")
       .def("raise_event", &ShellView::raise_event, py::arg("port"))
       .def("property", &ShellView::property, py::arg("name"), "The value in force.")
+      .def("times", &ShellView::times, py::arg("factor"), py::arg("property"),
+           "A number of times a property that is a length of time.")
       .def("ports", &ShellView::ports)
       .def("properties", &ShellView::properties)
       .def("clock", &ShellView::clock, "The component's logical clock, ns of CLOCK_MONOTONIC.")

@@ -56,7 +56,9 @@ PartFactory factory_of(const py::object& part, const std::string& kind) {
 
 /// The same class under a name of the registry.
 PartFactory factory_of(const py::object& part, const std::string& kind, const std::string& name) {
-  return {kind, name, factory_of(part, kind).make};
+  PartFactory factory = factory_of(part, kind);
+  factory.name = name;
+  return factory;
 }
 
 }  // namespace
@@ -136,11 +138,12 @@ void bind_registry(py::module_& module) {
   bind_resource_kinds(module);
   py::class_<PartFactory>(module, "PartFactory", "How to make a part written in Python.")
       .def(py::init([](const Typed<"typing.Literal['shell', 'core', 'fsm', 'resource']">& kind,
-                       const std::string& name, Typed<"typing.Callable[..., object]"> make) {
+                       const std::string& name, Typed<"typing.Callable[..., object]"> make,
+                       CoreTimes wcet_ns) {
              return PartFactory{kind.cast<std::string>(), name,
-                                std::make_shared<PythonObject>(std::move(make))};
+                                std::make_shared<PythonObject>(std::move(make)), std::move(wcet_ns)};
            }),
-           py::arg("kind"), py::arg("name"), py::arg("make"))
+           py::arg("kind"), py::arg("name"), py::arg("make"), py::arg("wcet_ns") = CoreTimes{})
       .def_readonly("kind", &PartFactory::kind)
       .def_readonly("name", &PartFactory::name);
   py::class_<DataResource>(
@@ -184,11 +187,13 @@ A second call for one path does nothing.)")
       .def(
           "add_python_core",
           [](PluginRegistry& self, const std::string& name, const std::string& shell,
-             Typed<"typing.Callable[[ShellView], object]"> factory) {
+             Typed<"typing.Callable[[ShellView], object]"> factory, CoreTimes wcet_ns) {
             const PartFactory part{"core", name, std::make_shared<PythonObject>(std::move(factory))};
-            self.add_core(name, shell, [part] { return make_python_core(part); });
+            self.add_core(name, shell, [part] { return make_python_core(part); }, {},
+                          {.wcet_ns = std::move(wcet_ns)});
           },
-          py::arg("name"), py::arg("shell"), py::arg("factory"), R"(factory(shell_view) -> core object.
+          py::arg("name"), py::arg("shell"), py::arg("factory"), py::arg("wcet_ns") = CoreTimes{},
+          R"(factory(shell_view) -> core object. `wcet_ns`: as Core.wcet_ns.
 
 Its actions run on the component's thread under the interpreter's lock.)")
       .def(
@@ -205,7 +210,8 @@ Its actions run on the component's thread under the interpreter's lock.)")
              const Typed<"type[mauve_rt.parts.cores.Core[typing.Any]]">& core,
              const std::string& shell_name) {
             const PartFactory part = factory_of(core, "core", name);
-            self.add_core(name, shell_name, [part] { return make_python_core(part); });
+            self.add_core(name, shell_name, [part] { return make_python_core(part); }, {},
+                          {.wcet_ns = part.wcet_ns});
           },
           py::arg("name"), py::arg("core_class"), py::arg("shell_name"))
       .def(
@@ -247,6 +253,14 @@ Its actions run on the component's thread under the interpreter's lock.)")
             const auto shell = self.make_shell(name);
             return ShellDescription{name, describe_ports(*shell), describe_properties(*shell),
                                     shell->bytes()};
+          },
+          py::arg("name"))
+      .def(
+          "describe_core",
+          [](const PluginRegistry& self, const std::string& name) {
+            const InterpreterUnlocked release;
+            const auto shell = self.make_shell(self.core_shell(name));
+            return describe_core(*self.make_core(name), *shell, self);
           },
           py::arg("name"))
       .def(

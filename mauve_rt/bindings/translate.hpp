@@ -64,6 +64,7 @@ struct PartFactory {
   std::string kind;  // shell, core, fsm or resource, so that none is taken for another
   std::string name;  // package/Class
   std::shared_ptr<PythonObject> make;
+  CoreTimes wcet_ns{};  // of a core
 };
 std::unique_ptr<Shell> make_python_shell(const PartFactory& factory, const PluginRegistry& registry);
 std::unique_ptr<CoreBase> make_python_core(const PartFactory& factory);
@@ -97,6 +98,8 @@ struct PortDescription {
   time_ns_t longest_hold_ns{0};
   bool wait_free{false};                  // takes no lock, as ports are connected now; of a component's
   std::vector<std::byte> stop_message{};  // of a component's
+  std::string on_commit{};                // of a shell's write port: "hold" or "set_zero"
+  std::string on_stop{};
 };
 std::vector<PortDescription> describe_ports(const Shell& shell);
 
@@ -139,6 +142,18 @@ struct ShellDescription {
   std::vector<PropertyDescription> properties;
   std::size_t bytes{0};  // of its class; 0: not written in C++
 };
+
+struct CoreDescription {
+  std::string name;
+  std::string shell;
+  bool is_python{false};
+  std::vector<std::string> classes;
+  CoreTimes wcet_ns;
+  time_ns_t budget_ns{0};
+  std::vector<std::pair<std::string, std::string>> state_fields;  // name and type
+};
+/// Of a core that is made only to be described. Throws Error (type_mismatch): it was written for another shell.
+CoreDescription describe_core(CoreBase& core, Shell& shell, const PluginRegistry& registry);
 
 /// An architecture with the registry it makes its parts from.
 struct PyArchitecture {

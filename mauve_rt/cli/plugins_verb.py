@@ -9,7 +9,13 @@ from mauve_rt.cli.verb import OK
 from mauve_rt.errors import one_line
 
 if TYPE_CHECKING:
-    from mauve_rt._kernel import DescribedState, PropertyDescription, ResourceParameter, ShellDescription
+    from mauve_rt._kernel import (
+        CoreDescription,
+        DescribedState,
+        PropertyDescription,
+        ResourceParameter,
+        ShellDescription,
+    )
     from mauve_rt.model.plugins import PluginLoader
 
 _FIELDS = ("kind", "name", "shell", "target", "prefix")
@@ -75,7 +81,9 @@ def _parts(loader: "PluginLoader", name: str) -> Iterator[dict[str, Any]]:
         if shell := name if kind == "shell" else part.get("shell"):
             loader.require("shell", shell)
             part |= _shell(registry.describe_shell(shell))
-        if kind == "fsm":
+        if kind == "core":
+            part |= _core(registry.describe_core(name))
+        elif kind == "fsm":
             part |= {"states": [_state(each) for each in registry.describe_fsm(name)]}
         elif kind == "resource":
             given = registry.resource_kind(name).parameters
@@ -86,9 +94,26 @@ def _parts(loader: "PluginLoader", name: str) -> Iterator[dict[str, Any]]:
         yield part
 
 
+def _core(core: "CoreDescription") -> dict[str, Any]:
+    return {
+        "python": core.is_python,
+        "classes": core.classes,
+        "budget_ns": core.budget_ns,
+        "methods": [{"name": name, "wcet_ns": time_ns} for name, time_ns in core.wcet_ns.items()],
+        "state": [{"name": name, "type": type_name} for name, type_name in core.state_fields],
+    }
+
+
 def _shell(shell: "ShellDescription") -> dict[str, Any]:
     ports = [
-        {"name": port.name, "kind": port.kind, "type": port.type, "required": port.required}
+        {
+            "name": port.name,
+            "kind": port.kind,
+            "type": port.type,
+            "required": port.required,
+            "on_commit": port.on_commit or None,
+            "on_stop": port.on_stop or None,
+        }
         for port in shell.ports
     ]
     properties = [_setting(one, one.value) | {"read once by": one.structural} for one in shell.properties]
@@ -116,10 +141,15 @@ def _state(state: "DescribedState") -> dict[str, Any]:
         "name": state.name,
         "kind": kind,
         "initial": state.is_initial,
+        "action": state.action,
         "duration_ns": state.duration_ns if is_timed else None,
+        "duration_text": state.duration_text,
+        "event_port": state.event_port,
         "min_interarrival_ns": state.min_interarrival_ns,
+        "min_interarrival_text": state.min_interarrival_text,
         "max_execution_ns": state.max_execution_ns,
         "wcet_ns": state.wcet_ns,
+        "guards": state.guards,
         "next": state.successors,
     }
 
@@ -136,7 +166,7 @@ def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
             rows = [
                 each | {"port": each["name"], "": "" if each["required"] else "optional"} for each in ports
             ]
-            out.print(dict_table(rows, ("port", "kind", "type", "")))
+            out.print(dict_table(rows, ("port", "kind", "type", "on_commit", "on_stop", "")))
         if settings := part.get("properties", part.get("parameters")):
             head = "property" if "properties" in part else "parameter"
             rows = [{head: each["name"], "range": _range(each)} | each for each in settings]
@@ -145,15 +175,31 @@ def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
             rows = [
                 {"state": each["name"] + (" (initial)" if each["initial"] else "")}
                 | each
-                | {"time": duration(each["duration_ns"] or 0), "next": ", ".join(each["next"])}
+                | {"time": _time(each, duration(each["duration_ns"] or 0)), "next": _next(each)}
                 for each in states
             ]
-            out.print(dict_table(rows, ("state", "kind", "time", "next")))
+            out.print(dict_table(rows, ("state", "kind", "action", "time", "next")))
+        if methods := part.get("methods"):
+            rows = [{"method": each["name"], "wcet": duration(each["wcet_ns"])} for each in methods]
+            out.print(dict_table(rows, ("method", "wcet")))
+        if fields := part.get("state"):
+            out.print(dict_table([{"state": each["name"]} | each for each in fields], ("state", "type")))
         if "bytes" in part:
             lists = ", ".join(part["capacities"])
             out.print(
                 f"{part['bytes']:,} bytes" + (f", lists that need a capacity: {lists}" if lists else "")
             )
+
+
+def _time(state: Mapping[str, Any], length: str) -> str:
+    """As `5 * unit_ms = 50 ms`."""
+    return f"{state['duration_text']} = {length}" if state["duration_text"] else length
+
+
+def _next(state: Mapping[str, Any]) -> str:
+    """As `if has_path: Following, Idle`."""
+    guards = [f"if {guard}: " for guard in state["guards"]]
+    return ", ".join(guard + to for guard, to in zip([*guards, ""], state["next"], strict=False))
 
 
 def _range(setting: Mapping[str, Any]) -> str:

@@ -313,7 +313,8 @@ class PluginLoader:
         if plugin.kind == "core":
             from mauve_rt.parts.cores import core_factory  # noqa: PLC0415
 
-            self.registry.add_python_core(plugin.name, plugin.shell, core_factory(part))
+            wcet_ns = dict(getattr(part, "wcet_ns", {}))
+            self.registry.add_python_core(plugin.name, plugin.shell, core_factory(part), wcet_ns)
         elif plugin.kind == "fsm":
             self.registry.fsm(plugin.name, part, plugin.shell)
         elif plugin.kind == "shell":

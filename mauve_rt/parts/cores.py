@@ -54,6 +54,10 @@ class Core(Configurable, Generic[ShellT]):
     """Attributes that a core which replaces this one takes over, with types: {"integral": "float64"}. Each is
     copied before take, where the other core, in Python or C++, has a field of the same name and type."""
 
+    wcet_ns: ClassVar[Mapping[str, int]] = {}
+    """Worst-case execution times of actions and guards for the timing analysis: {"follow": us_to_ns(200)}.
+    Nothing enforces them. An execution state takes that of its action and of the guards asked after it."""
+
     _shell_class: ClassVar[type[Any]] = Shell
 
     def __init__(self, shell: ShellT) -> None:
@@ -82,7 +86,7 @@ class Core(Configurable, Generic[ShellT]):
 
     @classmethod
     def _part(cls) -> PartFactory:
-        return PartFactory("core", implementation_name(cls), cls._make)
+        return PartFactory("core", implementation_name(cls), cls._make, dict(cls.wcet_ns))
 
     @classmethod
     def _make(cls, view: ShellView) -> "Core[Any]":

@@ -16,10 +16,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Generic
 
-from mauve_rt._kernel import FsmBuilder, PartFactory, ShellView
+from mauve_rt._kernel import Duration, FsmBuilder, PartFactory, ShellView
 from mauve_rt.parts.cores import Core, ShellT
 from mauve_rt.parts.part import Configurable, implementation_name
-from mauve_rt.parts.ports import ReadPort
+from mauve_rt.parts.ports import Property, ReadPort
 from mauve_rt.parts.shells import shell_of
 
 if TYPE_CHECKING:
@@ -31,7 +31,18 @@ else:
 
     CoreT = TypeVar("CoreT")
 
-__all__ = ["Fsm", "State"]
+__all__ = ["Duration", "Fsm", "State", "times"]
+
+
+def times(factor: int, property: Property[int]) -> Duration:  # noqa: A002 - the word of the shell
+    """A number of times an int property whose unit is ns, us, ms or s; its text is `5 * unit_ms`.
+
+        self.wait("W5", times(5, self.shell.unit_ms))
+
+    Raises:
+        MauveError: invalid_argument (no such property), out_of_range (longer than a time can be).
+    """
+    return property.times(factor)
 
 
 @dataclass(frozen=True)
@@ -72,16 +83,20 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
         self._machine.execution(name, _method_name(method), *times)
         return State(name)
 
-    def wait(self, name: str, duration_ns: int) -> State:
+    def wait(self, name: str, duration_ns: int | Duration) -> State:
         """A state that advances the component's clock by a duration > 0 and sleeps until then.
 
         `FOREVER`: until the component is stopped; such a state leads nowhere, and needs no next().
         """
-        self._machine.wait(name, duration_ns)
+        self._machine.wait(name, _duration(duration_ns))
         return State(name)
 
     def wait_event(
-        self, name: str, port: ReadPort[Any] | str, timeout_ns: int, min_interarrival_ns: int
+        self,
+        name: str,
+        port: ReadPort[Any] | str,
+        timeout_ns: int | Duration,
+        min_interarrival_ns: int | Duration,
     ) -> State:
         """A state that waits for a write to the resource that a read port is connected to.
 
@@ -89,7 +104,8 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
         no event comes. Both > 0. A machine with such a state is sporadic: it has no period.
         """
         port_name = port if isinstance(port, str) else port.name
-        self._machine.wait_event(name, port_name, timeout_ns, min_interarrival_ns)
+        durations = (_duration(timeout_ns), _duration(min_interarrival_ns))
+        self._machine.wait_event(name, port_name, *durations)
         return State(name)
 
     def set_initial(self, state: State) -> None:
@@ -131,3 +147,7 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
 
 def _method_name(method: str | Callable[..., object]) -> str:
     return method if isinstance(method, str) else method.__name__
+
+
+def _duration(length: int | Duration) -> Duration:
+    return length if isinstance(length, Duration) else Duration(length)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Generic, Literal, ParamSpec, TypeVar
 
-from mauve_rt._kernel import ShellBuilder, ShellView
+from mauve_rt._kernel import Duration, ShellBuilder, ShellView
 from mauve_rt.parts import messages
 
 __all__ = [
@@ -238,3 +238,7 @@ class Property(Member, Generic[V]):
         """The value in force since the component last left a wait."""
         value: V = self._shell.property(self.name)
         return value
+
+    def times(self, factor: int) -> Duration:
+        """A number of times its value, as `mauve_rt.api.times` describes it."""
+        return self._shell.times(factor, self.name)

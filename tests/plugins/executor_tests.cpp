@@ -382,6 +382,39 @@ struct LoopFsm : mauve::Fsm<CounterShell, Counter> {
   }
 };
 
+/// Has the unit of its fsm's waits, and declares the policies of an output.
+struct TimedShell : CounterShell {
+  mauve::Property<std::int64_t>& unit_ms = property(
+      "unit_ms", 10, {.unit = "ms", .minimum = 1, .maximum = 1000, .structural = mauve::ReadBy::fsm});
+  mauve::WritePort<Number>& kept = write_port<Number>("kept", {.on_commit = mauve::OutputPolicy::set_zero,
+                                                               .on_stop = mauve::OutputPolicy::hold})
+                                       .optional();
+};
+
+/// Declares worst-case execution times where it is registered.
+struct Timed : Counter {
+  MAUVE_STATE(count)
+ public:
+  bool is_enabled() const { return shell().enabled; }
+  mauve::time_ns_t budget_ns() const noexcept override { return mauve::us_to_ns(100); }
+};
+
+struct TimedFsm : mauve::Fsm<TimedShell, Timed> {
+  void define() override {
+    mauve::State& run = execution("Count", "act", &Timed::act);
+    mauve::State& again = execution("Again", "act", &Timed::act);
+    mauve::State& pause = wait("Pause", mauve::times(5, shell().unit_ms));
+    mauve::State& event =
+        wait_event("Event", shell().set, mauve::times(3, shell().unit_ms), mauve::times(1, shell().unit_ms));
+    set_initial(run);
+    transition(run, "is_enabled", &Timed::is_enabled, pause);
+    next(run, event);
+    next(pause, run);
+    next(event, again);
+    next(again, pause);
+  }
+};
+
 struct OtherShell : mauve::Shell {};
 
 /// A counter's shell by another author: a port less, a property more.
@@ -678,6 +711,12 @@ MAUVE_PLUGINS(registry) {
   registry.core<Hanging>("executor_tests/Hanging", shell);
   registry.core<Patient>("executor_tests/Patient", shell);
   registry.core<Clinging>("executor_tests/Clinging", shell);
+  const std::string timed = "executor_tests/TimedShell";
+  registry.shell<TimedShell>(timed);
+  registry.core<Timed>("executor_tests/Timed", timed,
+                       {.wcet_ns = {{"act", mauve::us_to_ns(200)}, {"is_enabled", mauve::us_to_ns(1)}}});
+  registry.core<Timed>("executor_tests/HalfTimed", timed, {.wcet_ns = {{"act", mauve::us_to_ns(300)}}});
+  registry.fsm<TimedFsm>("executor_tests/TimedFsm", timed);
   registry.fsm<CounterFsm>("executor_tests/CounterFsm", shell);
   registry.fsm<GuardedFsm>("executor_tests/GuardedFsm", shell);
   registry.fsm<LoopFsm>("executor_tests/LoopFsm", shell);

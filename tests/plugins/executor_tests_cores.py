@@ -9,6 +9,7 @@ import tempfile
 import threading
 import time
 from pathlib import Path
+from typing import ClassVar
 
 import rclpy
 from rclpy.context import Context
@@ -34,6 +35,18 @@ class PyCounter(Core):
             self.count = sample.value.data
         self.count += 100.0 * self.shell.step.value
         self.shell.count.write(Float64(data=self.count))
+
+
+class PyTimed(PyCounter):
+    """Declares worst-case execution times and state."""
+
+    budget_ns = 50_000
+    state_fields: ClassVar[dict[str, str]] = {"count": "float64"}
+    wcet_ns: ClassVar[dict[str, int]] = {"act": 400_000, "is_enabled": 2_000}
+
+    def is_enabled(self) -> bool:
+        """Ask the shell."""
+        return self.shell.enabled.value
 
 
 class PyHanging(PyCounter):

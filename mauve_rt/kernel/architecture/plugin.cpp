@@ -178,13 +178,15 @@ void PluginRegistry::add_shell(const std::string& name, std::function<std::uniqu
           .shell = "", .make = std::move(factory), .classes = std::move(classes), .library = loading_});
 }
 void PluginRegistry::add_core(const std::string& name, const std::string& shell_name, CoreFactory factory,
-                              std::vector<std::string> classes) {
+                              std::vector<std::string> classes, CoreOptions options) {
+  check_core_times(name, options.wcet_ns);
   const LockGuard lock(mutex_);
   add(&PluginRegistry::cores_, name, "core " + name,
       Entry<CoreBase>{.shell = shell_name,
                       .make = std::move(factory),
                       .classes = std::move(classes),
-                      .library = loading_});
+                      .library = loading_,
+                      .core = std::move(options)});
   note_builds();
 }
 void PluginRegistry::add_fsm(const std::string& name, const std::string& shell_name,
@@ -330,6 +332,7 @@ auto make_part(const std::shared_ptr<const Entry>& entry, const std::string& kin
   part->set_implementation(name);
   part->set_generation(entry->generation);
   part->set_class_builds(entry->builds);
+  if constexpr (requires { part->set_wcet_ns({}); }) part->set_wcet_ns(entry->core.wcet_ns);
   return part;
 }
 

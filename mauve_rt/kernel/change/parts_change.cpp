@@ -53,7 +53,7 @@ PartsChange::PartsChange(Component& component, Parts fresh)
       restarts_(parts_.shell != nullptr || parts_.fsm != nullptr),
       trace_id_(TraceNames::intern(change_name(parts_))) {
   task = &component.task();
-  if (parts_.core != nullptr) core_name_ = TraceNames::intern(parts_.core->implementation());
+  if (parts_.core != nullptr) shown_core_ = component.keep_shown(*parts_.core);
   if (parts_.shell == nullptr) return;
   parts_.shell->set_context(&component_.task().context());
   copy_properties(component_.shown().properties, *parts_.shell);
@@ -156,10 +156,10 @@ void PartsChange::exchange_core() noexcept {
   const bool had_fallen_back = component_.task_.has_fallen_back();
   component_.task_.set_fallen_back(fallen_back_);
   fallen_back_ = had_fallen_back;
-  // relaxed: lone facts
-  core_name_ = component_.core_name_.exchange(core_name_, std::memory_order_relaxed);
+  // release: a reader of the pointer sees the ShownCore
+  shown_core_ = component_.shown_core_.exchange(shown_core_, std::memory_order_acq_rel);
   if (component_.task_.has_fallen_back())
-    component_.faulted_core_.store(core_name_, std::memory_order_relaxed);
+    component_.faulted_core_.store(shown_core_, std::memory_order_release);
 }
 
 void PartsChange::exchange_fsm() noexcept {

@@ -33,6 +33,10 @@ class StopWrite {
 
 }  // namespace
 
+std::string_view to_string(OutputPolicy policy) noexcept {
+  return policy == OutputPolicy::hold ? "hold" : "set_zero";
+}
+
 std::string_view to_string(PortKind kind) noexcept {
   switch (kind) {
     case PortKind::read:

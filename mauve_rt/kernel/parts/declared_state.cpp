@@ -6,7 +6,7 @@
 namespace mauve {
 
 void check_wcet(const std::string& state, time_ns_t wcet_ns, time_ns_t max_execution_ns,
-                const std::string& component) {
+                const std::string& component, const std::string& core) {
   if (wcet_ns < 0 || wcet_ns > kLongest) {
     throw Error(ErrorCode::out_of_range, "a state's time is out of range",
                 {.component = component,
@@ -19,7 +19,7 @@ void check_wcet(const std::string& state, time_ns_t wcet_ns, time_ns_t max_execu
               {.component = component,
                .element = "state " + state + ", wcet_ns",
                .expected = "at most max_execution_ns, which is " + std::to_string(max_execution_ns) + " ns",
-               .found = std::to_string(wcet_ns),
+               .found = std::to_string(wcet_ns) + (core.empty() ? "" : ", declared by core " + core),
                .remedy = "lower wcet_ns, or raise max_execution_ns"});
 }
 

@@ -139,6 +139,11 @@ void check_lengths(const std::vector<const State*>& reachable) {
                .remedy = "wait for kForever where only a stop is to end the wait"});
 }
 
+/// As "50", or "5 * unit_ms, which is 50".
+std::string in_words(const Duration& duration) {
+  return (duration.text.empty() ? "" : duration.text + ", which is ") + std::to_string(duration.ns);
+}
+
 /// See FsmBase::initial_interarrival_ns().
 time_ns_t interarrival_before(const State& initial, const std::vector<std::unique_ptr<State>>& states) {
   if (initial.is_wait) return 0;
@@ -198,51 +203,52 @@ State& FsmBase::add_execution(std::string name) {
   return state;
 }
 
-State& FsmBase::wait(std::string name, time_ns_t duration_ns) {
-  if (duration_ns <= 0) {
-    throw Error(
-        ErrorCode::bad_fsm, "a wait has no length",
-        {.element = "state " + name, .expected = "a duration > 0 ns", .found = std::to_string(duration_ns)});
+State& FsmBase::wait(std::string name, const Duration& duration) {
+  if (duration.ns <= 0) {
+    throw Error(ErrorCode::bad_fsm, "a wait has no length",
+                {.element = "state " + name, .expected = "a duration > 0 ns", .found = in_words(duration)});
   }
   State& state = add_state(std::move(name));
   state.is_wait = true;
-  state.duration_ns = duration_ns;
+  state.duration_ns = duration.ns;
+  state.duration_text = duration.text;
   return state;
 }
 
-State& FsmBase::wait_event(std::string name, PortBase& port, time_ns_t timeout_ns,
-                           time_ns_t min_interarrival_ns) {
+State& FsmBase::wait_event(std::string name, PortBase& port, const Duration& timeout,
+                           const Duration& min_interarrival) {
   if (port.kind() != PortKind::read) {
     throw Error(ErrorCode::bad_fsm, "an event wait needs a port that reads",
                 {.element = "state " + name,
                  .expected = "a read port",
                  .found = "the " + std::string(to_string(port.kind())) + " port " + port.name()});
   }
-  if (min_interarrival_ns <= 0 || timeout_ns < min_interarrival_ns) {
-    throw Error(ErrorCode::bad_fsm, "an event wait's times do not fit",
-                {.element = "state " + name,
-                 .expected = "0 < min_interarrival_ns <= timeout_ns",
-                 .found = "min_interarrival_ns " + std::to_string(min_interarrival_ns) + ", timeout_ns " +
-                          std::to_string(timeout_ns)});
+  if (min_interarrival.ns <= 0 || timeout.ns < min_interarrival.ns) {
+    throw Error(
+        ErrorCode::bad_fsm, "an event wait's times do not fit",
+        {.element = "state " + name,
+         .expected = "0 < min_interarrival_ns <= timeout_ns",
+         .found = "min_interarrival_ns " + in_words(min_interarrival) + ", timeout_ns " + in_words(timeout)});
   }
-  if (timeout_ns < kShortestTimeout) {
+  if (timeout.ns < kShortestTimeout) {
     throw Error(ErrorCode::bad_fsm,
                 "the timeout of an event wait is so short that the component would never rest",
                 {.element = "state " + name,
                  .expected = "timeout_ns of at least " + std::to_string(kShortestTimeout),
-                 .found = std::to_string(timeout_ns),
+                 .found = in_words(timeout),
                  .remedy = "give a longer timeout, or wait for a length of time instead"});
   }
-  if (min_interarrival_ns > kLongest) {
+  if (min_interarrival.ns > kLongest) {
     throw Error(ErrorCode::bad_fsm, "the minimal interarrival of an event wait is too long",
                 {.element = "state " + name,
                  .expected = "min_interarrival_ns of at most " + std::to_string(kLongest),
-                 .found = std::to_string(min_interarrival_ns),
+                 .found = in_words(min_interarrival),
                  .remedy = "give the least time between two releases"});
   }
-  State& state = wait(std::move(name), timeout_ns);
+  State& state = wait(std::move(name), timeout);
   state.event = std::make_unique<EventInput>(port);
-  state.min_interarrival_ns = min_interarrival_ns;
+  state.min_interarrival_ns = min_interarrival.ns;
+  state.min_interarrival_text = min_interarrival.text;
   return state;
 }
 
@@ -312,10 +318,39 @@ std::vector<DescribedState> FsmBase::describe_states() const {
                    .max_execution_ns = state->max_execution_ns,
                    .simulated_execution_ns = state->simulated_execution_ns,
                    .successors = {},
-                   .wcet_ns = state->wcet_ns});
+                   .wcet_ns = state->wcet_ns,
+                   .duration_text = state->duration_text,
+                   .min_interarrival_text = state->min_interarrival_text,
+                   .action = state->is_wait ? "" : methods_[state->action].name(),
+                   .guards = {},
+                   .event_port = state->event != nullptr ? state->event->port().name() : "",
+                   .wcet_core = {},
+                   .methods_without_wcet = {}});
     for (const State* next : successors(*state)) all.back().successors.push_back(next->name);
+    for (const Transition& transition : state->transitions)
+      all.back().guards.push_back(methods_[transition.guard].name());
   }
   return all;
+}
+
+void add_core_times(std::vector<DescribedState>& states, const std::string& core, const CoreTimes& times) {
+  if (times.empty()) return;
+  for (DescribedState& state : states) {
+    if (state.is_wait || state.wcet_ns != 0) continue;
+    time_ns_t all_ns = 0;
+    const auto add = [&](const std::string& method) {
+      const auto found = times.find(method);
+      if (found == times.end()) {
+        state.methods_without_wcet.push_back(method);
+      } else {
+        all_ns = later_by(all_ns, found->second);
+      }
+    };
+    add(state.action);
+    for (const std::string& guard : state.guards) add(guard);
+    state.wcet_core = core;
+    if (state.methods_without_wcet.empty()) state.wcet_ns = all_ns;
+  }
 }
 
 void FsmBase::take_declared_times() {

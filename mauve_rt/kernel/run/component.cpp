@@ -113,20 +113,20 @@ void Component::set_parts(Parts parts) {
   present_core_.store(parts_.core.get(), std::memory_order_release);
   present_fsm_.store(parts_.fsm.get(), std::memory_order_release);
   declared_core_ = parts_.core->implementation();
-  core_name_.store(TraceNames::intern(declared_core_), std::memory_order_relaxed);
+  shown_core_.store(keep_shown(*parts_.core), std::memory_order_release);
   show();
 }
 
 ShownParts Component::shown() const {
   const LockGuard lock(shown_mutex_);
   ShownParts shown = shown_;
-  shown.core = TraceNames::word(core_name_.load(std::memory_order_relaxed));
+  if (const ShownCore* const core = shown_core_.load(std::memory_order_acquire)) shown.core = core->name;
   return shown;
 }
 
 std::string Component::faulted_core() const {
-  // relaxed: a lone fact
-  return task_.has_fallen_back() ? TraceNames::word(faulted_core_.load(std::memory_order_relaxed)) : "";
+  const ShownCore* const core = faulted_core_.load(std::memory_order_acquire);
+  return task_.has_fallen_back() && core != nullptr ? core->name : "";
 }
 
 std::shared_ptr<const StateTimes> Component::state_times() const {
@@ -134,9 +134,29 @@ std::shared_ptr<const StateTimes> Component::state_times() const {
   return shown_times_;
 }
 
-std::vector<DescribedState> Component::described_states() const {
+const ShownCore* Component::keep_shown(const CoreBase& core) {
   const LockGuard lock(shown_mutex_);
-  return shown_states_;
+  return &*cores_.insert({.name = core.implementation(), .wcet_ns = core.wcet_ns()}).first;
+}
+
+std::vector<DescribedState> Component::described_states() const {
+  std::vector<DescribedState> states;
+  {
+    const LockGuard lock(shown_mutex_);
+    states = shown_states_;
+  }
+  // Not in show(): a fallback may take the core's place at any moment.
+  if (const ShownCore* const core = shown_core_.load(std::memory_order_acquire))
+    add_core_times(states, core->name, core->wcet_ns);
+  return states;
+}
+
+std::vector<DescribedState> Component::states_of(const FsmBase& fsm, const CoreBase& core) const {
+  std::vector<DescribedState> states = fsm.describe_states();
+  add_core_times(states, core.implementation(), core.wcet_ns());
+  for (const DescribedState& state : states)
+    check_wcet(state.name, state.wcet_ns, state.max_execution_ns, name_, state.wcet_core);
+  return states;
 }
 
 std::vector<DescribedState> Component::previewed_states() const {
@@ -144,8 +164,9 @@ std::vector<DescribedState> Component::previewed_states() const {
   if (fsm == nullptr) return described_states();
   bind_fsm(*fsm, *parts_.shell);
   fsm->configure();
-  std::vector<DescribedState> states = fsm->describe_states();
+  std::vector<DescribedState> states;
   try {
+    states = states_of(*fsm, *parts_.core);
     require_declared_states(*fsm);
   } catch (...) {
     fsm->cleanup();
@@ -292,7 +313,10 @@ void Component::bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& 
 CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const {
   CoreBinding binding = fsm.bind_core(core);
   binding.core = &core;
-  if (binding.is_bound()) return binding;
+  if (binding.is_bound()) {
+    states_of(fsm, core);  // checks the core's times
+    return binding;
+  }
   throw Error(
       ErrorCode::type_mismatch, "the core is not of the type that the fsm runs",
       {.component = name_,
@@ -531,7 +555,7 @@ void Component::cleanup_hook() {
     if (is_in) std::swap(fallback_core_, parts_.core);
     present_core_.store(parts_.core.get(), std::memory_order_release);
     if (parts_.core != nullptr)  // else release_core()
-      core_name_.store(TraceNames::intern(parts_.core->implementation()), std::memory_order_relaxed);
+      shown_core_.store(keep_shown(*parts_.core), std::memory_order_release);
     fallback_.reset();
     fallback_core_->cleanup();
     if (is_replaced) fallback_core_.reset();

@@ -79,6 +79,33 @@ def test_a_worst_case_comes_before_the_bound_that_is_enforced(told: Callable[...
     assert bound["states"] == [{"name": "Count", "time_ns": 200_000, "origin": BOUND}]
 
 
+TIMED = """\
+mauve: 1
+components:
+  one: {shell: executor_tests/TimedShell, core: executor_tests/Timed, fsm: executor_tests/TimedFsm,
+        priority: 40, cpus: [0], states: {Again: {wcet_ns: 250000}}}
+"""
+
+
+def test_worst_cases_of_a_core_are_said_to_be_its_own(
+    analyze: Analyze, told: Callable[..., dict[str, Any]]
+) -> None:
+    status, out, _ = analyze(TIMED)
+    assert status == 0
+    assert "  Count: 0.201 ms, declared by core executor_tests/Timed\n" in out
+    assert "  Again: 0.250 ms, declared\n" in out
+    half = told(TIMED.replace("Timed,", "HalfTimed,"))["one"]
+    assert half["states"] == [
+        {"name": "Count", "time_ns": None, "origin": "missing"},
+        {"name": "Again", "time_ns": 250_000, "origin": "declared"},
+    ]
+    (why,) = half["not_provable"]
+    assert why == (
+        "no time is known of Count (core executor_tests/HalfTimed declares no time of is_enabled): "
+        "declare wcet_ns, or measure (--budget-from BAG)"
+    )
+
+
 def test_what_cannot_be_proved_is_said_of_each_component(told: Callable[..., dict[str, Any]]) -> None:
     found = told(ROBOT)
     assert found["guard"]["not_provable"] == [

@@ -207,3 +207,61 @@ def test_a_part_has_its_ports_properties_and_states(
     assert "lists that need a capacity: name, position, velocity, effort" in capsys.readouterr().out
     assert main(["plugins", "executor_tests/PyCouter"]) != 0
     assert "executor_tests/PyCounter" in capsys.readouterr().err
+
+
+def shown_json(capsys: pytest.CaptureFixture[str], name: str) -> dict[str, Any]:
+    """What `mauve plugins NAME --json` says of a part."""
+    assert main(["plugins", name, "--json"]) == 0
+    [part] = json.loads(capsys.readouterr().out)
+    return dict(part)
+
+
+@pytest.mark.usefixtures("plugin_prefix")
+def test_an_fsm_has_its_methods_and_the_expressions_of_its_waits(capsys: pytest.CaptureFixture[str]) -> None:
+    states = {state["name"]: state for state in shown_json(capsys, "executor_tests/TimedFsm")["states"]}
+    count, pause, event = states["Count"], states["Pause"], states["Event"]
+    assert (count["action"], count["guards"], count["next"]) == ("act", ["is_enabled"], ["Pause", "Event"])
+    assert (pause["duration_text"], pause["duration_ns"]) == ("5 * unit_ms", 50_000_000)
+    assert (event["event_port"], event["duration_text"]) == ("set", "3 * unit_ms")
+    assert (event["min_interarrival_text"], event["min_interarrival_ns"]) == ("1 * unit_ms", 10_000_000)
+    assert main(["plugins", "executor_tests/TimedFsm"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "if is_enabled: Pause, Event" in said
+    assert "5 * unit_ms = 50 ms" in said
+
+
+@pytest.mark.usefixtures("plugin_prefix")
+def test_a_core_has_its_worst_cases_and_its_state(capsys: pytest.CaptureFixture[str]) -> None:
+    core = shown_json(capsys, "executor_tests/Timed")
+    assert core["methods"] == [
+        {"name": "act", "wcet_ns": 200_000},
+        {"name": "is_enabled", "wcet_ns": 1_000},
+    ]
+    assert core["state"] == [{"name": "count", "type": "float64"}]
+    assert (core["python"], core["budget_ns"], len(core["classes"]) > 0) == (False, 100_000, True)
+    python = shown_json(capsys, "executor_tests/PyTimed")
+    assert python["methods"] == [
+        {"name": "act", "wcet_ns": 400_000},
+        {"name": "is_enabled", "wcet_ns": 2_000},
+    ]
+    assert python["state"] == [{"name": "count", "type": "float64"}]
+    assert (python["python"], python["budget_ns"], python["classes"]) == (True, 50_000, [])
+    assert main(["plugins", "executor_tests/Timed"]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    assert "is_enabled 1 us" in said
+    assert "count float64" in said
+
+
+@pytest.mark.usefixtures("plugin_prefix")
+def test_a_shell_has_the_policies_of_its_outputs(capsys: pytest.CaptureFixture[str]) -> None:
+    ports = {port["name"]: port for port in shown_json(capsys, "executor_tests/TimedShell")["ports"]}
+    policies = {name: (port["on_commit"], port["on_stop"]) for name, port in ports.items()}
+    assert policies == {
+        "set": (None, None),
+        "count": ("hold", "set_zero"),
+        "kept": ("set_zero", "hold"),
+    }
+    caller = {port["name"]: port for port in shown_json(capsys, "executor_tests/CallerShell")["ports"]}
+    calls = {name: port["type"] for name, port in caller.items() if port["kind"] == "call"}
+    assert calls
+    assert all(calls.values()), "of a call port the type is the name that its service declares"

@@ -18,6 +18,7 @@ from mauve_rt.api import (
     ComponentDescription,
     Core,
     Deployer,
+    Duration,
     EventCounter,
     EventPort,
     Fsm,
@@ -52,6 +53,7 @@ from mauve_rt.api import (
     read_resource,
     s_to_ns,
     service,
+    times,
     us_to_ns,
     write_port,
 )
@@ -163,6 +165,9 @@ def members(shell: HoverShell) -> tuple[WritePort[Pose], CallPort[[int], float],
 class EventFsm(Fsm[HoverShell, HoverCore]):
     def define(self) -> None:
         heard = self.wait_event("Heard", self.shell.pose, ms_to_ns(100), ms_to_ns(1))
+        assert_type(times(2, self.shell.tries), Duration)
+        self.wait_event("Again", self.shell.pose, times(9, self.shell.tries), Duration(5, "5 * tries"))
+        self.wait("Rest", times(1, self.shell.height))  # type: ignore[arg-type]
         also = self.wait_event("Also", "pose", timeout_ns=s_to_ns(1), min_interarrival_ns=1)
         self.set_initial(heard)
         self.next(heard, also)

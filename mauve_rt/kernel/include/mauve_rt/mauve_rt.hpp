@@ -30,6 +30,8 @@
 #include "mauve_rt/deploy/simulation.hpp"
 #include "mauve_rt/elements/elements.hpp"
 #include "mauve_rt/parts/core.hpp"
+#include "mauve_rt/parts/core_times.hpp"
+#include "mauve_rt/parts/duration.hpp"
 #include "mauve_rt/parts/fsm.hpp"
 #include "mauve_rt/parts/property.hpp"
 #include "mauve_rt/parts/shell.hpp"

@@ -10,6 +10,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/architecture/given_resources.hpp"
@@ -46,6 +47,11 @@ consteval PluginAbi plugin_abi() {
   }
   return abi;
 }
+
+/// Facts about a core that its class does not say.
+struct CoreOptions {
+  CoreTimes wcet_ns{};  // worst-case execution times of its methods, for the timing analysis; not enforced
+};
 
 /// Entries of a registry that others have taken the place of, and the names that there were not before. Keep it as long as
 /// the registry: parts of the old code may still be in force.
@@ -99,10 +105,13 @@ class PluginRegistry {
         },
         user_classes(typeid(ShellType)));
   }
-  /// `shell_name`: the shell it was written for.
+  /// `shell_name`: the shell it was written for. `options`: {.wcet_ns = {{"compute_path", mauve::ms_to_ns(5)}}}.
+  /// Throws Error (out_of_range) as check_core_times().
   template <typename CoreType>
-  void core(const std::string& name, const std::string& shell_name) {
-    add_core(name, shell_name, [] { return std::make_unique<CoreType>(); }, user_classes(typeid(CoreType)));
+  void core(const std::string& name, const std::string& shell_name, CoreOptions options = {}) {
+    add_core(
+        name, shell_name, [] { return std::make_unique<CoreType>(); }, user_classes(typeid(CoreType)),
+        std::move(options));
   }
   template <typename FsmType>
   void fsm(const std::string& name, const std::string& shell_name) {
@@ -142,8 +151,9 @@ class PluginRegistry {
 
   void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory,
                  std::vector<std::string> classes = {});
+  /// Throws Error (out_of_range) as check_core_times().
   void add_core(const std::string& name, const std::string& shell_name, CoreFactory factory,
-                std::vector<std::string> classes = {});
+                std::vector<std::string> classes = {}, CoreOptions options = {});
   void add_fsm(const std::string& name, const std::string& shell_name,
                std::function<std::unique_ptr<FsmBase>()> factory, std::vector<std::string> classes = {});
   /// A kind without types.
@@ -193,6 +203,7 @@ class PluginRegistry {
     std::string library{};  // empty: none
     int generation{1};
     std::shared_ptr<const ClassBuilds> builds{};  // of the classes, as they were in force at its registration
+    CoreOptions core{};                           // of a core
   };
   template <typename Product>
   using Entries = std::map<std::string, Entry<Product>>;

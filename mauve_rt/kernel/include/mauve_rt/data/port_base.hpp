@@ -28,6 +28,9 @@ enum class OutputPolicy : std::uint8_t {
   set_zero,  // write the type's default value
 };
 
+/// "hold" or "set_zero". [rt]
+std::string_view to_string(OutputPolicy policy) MAUVE_RT;
+
 struct OutputOptions {
   OutputPolicy on_commit{OutputPolicy::hold};
   OutputPolicy on_stop{OutputPolicy::set_zero};

@@ -41,19 +41,19 @@ class PeriodicFsm : public Fsm<ShellType, CoreType> {
   };
 
   /// The one period of all states. Called once, before the first state. [setup] Throws Error (bad_fsm).
-  void period(time_ns_t period_ns) {
-    if (period_ns_ != 0) refuse("the period is given twice", "call period() once: a PSM has one period");
-    if (period_ns <= 0) refuse("the period has no length", "give period() a time > 0 ns");
-    period_ns_ = period_ns;
-    this->declare_divisor(period_ns);
+  void period(Duration period) {
+    if (period_.ns != 0) refuse("the period is given twice", "call period() once: a PSM has one period");
+    if (period.ns <= 0) refuse("the period has no length", "give period() a time > 0 ns");
+    period_ = std::move(period);
+    this->declare_divisor(period_.ns);
   }
 
   /// A state that runs a method of the core. Where no guard holds and next() says nothing, the machine stays in
   /// the state, executing its action in each period. [setup] Throws Error: bad_fsm, duplicate_name.
   PeriodicState periodic_state(std::string name, std::string method_name, void (CoreType::*method)(),
                                time_ns_t max_execution_ns = 0) {
-    if (period_ns_ == 0) refuse("the period is not given", "call period() before the first state");
-    State& release = Base::wait("Await" + name, period_ns_);
+    if (period_.ns == 0) refuse("the period is not given", "call period() before the first state");
+    State& release = Base::wait("Await" + name, period_);
     State& action = Base::execution(std::move(name), std::move(method_name), method, max_execution_ns);
     Base::next(release, action);
     Base::next(action, release);
@@ -77,7 +77,7 @@ class PeriodicFsm : public Fsm<ShellType, CoreType> {
   }
 
   bool configure_hook() override {
-    period_ns_ = 0;
+    period_ = 0;
     return Base::configure_hook();
   }
 
@@ -90,7 +90,7 @@ class PeriodicFsm : public Fsm<ShellType, CoreType> {
     throw Error(ErrorCode::bad_fsm, what, {.element = this->description(), .remedy = remedy});
   }
 
-  time_ns_t period_ns_{0};
+  Duration period_{0};
 };
 
 }  // namespace mauve

@@ -108,7 +108,7 @@ class SporadicFsm : public ServerFsm<ShellType, CoreType> {
  protected:
   void define() override {
     State& serve = this->serving("Serve");
-    State& apart = this->wait("KeepApart", us_to_ns(this->shell().period_us));
+    State& apart = this->wait("KeepApart", mauve::times(1, this->shell().period_us));
     this->set_initial(apart);  // a request from before the start has no event
     this->next(serve, apart);
     this->take(apart, serve, this->awaiting(serve));
@@ -121,7 +121,7 @@ template <typename ShellType, typename CoreType = ServerCore<ShellType>>
 class PollingServerFsm : public ServerFsm<ShellType, CoreType> {
  protected:
   void define() override {
-    State& poll = this->wait("Poll", us_to_ns(this->shell().period_us));
+    State& poll = this->wait("Poll", mauve::times(1, this->shell().period_us));
     this->set_initial(poll);
     State* before = &poll;
     for (std::int64_t number = 1; number <= this->shell().budget; ++number) {

@@ -27,7 +27,7 @@ template <typename ShellType, typename CoreType = UpdateCore<ShellType>>
 class PeriodicUpdateFsm : public PeriodicFsm<ShellType, CoreType> {
  protected:
   void define() override {
-    this->period(us_to_ns(this->shell().period_us));
+    this->period({us_to_ns(this->shell().period_us), "1 * period_us"});
     this->set_initial(this->periodic_state("Update", "update", &CoreType::update));
   }
 };

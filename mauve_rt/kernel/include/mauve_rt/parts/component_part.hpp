@@ -35,6 +35,7 @@ class ComponentPart : public ConfigurablePart {
     if (made == nullptr) throw_no_object(description());
     made->set_implementation(implementation_);
     made->set_factory(make_);
+    if constexpr (requires { made->wcet_ns(); }) made->set_wcet_ns(static_cast<const Base*>(this)->wcet_ns());
     return made;
   }
 

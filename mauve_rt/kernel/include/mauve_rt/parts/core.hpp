@@ -4,11 +4,13 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/parts/component_part.hpp"
+#include "mauve_rt/parts/core_times.hpp"
 #include "mauve_rt/parts/shell.hpp"
 #include "mauve_rt/parts/state_fields.hpp"
 
@@ -47,6 +49,14 @@ class CoreBase : public ComponentPart<CoreBase> {
   /// Whether adopt and take look no C++ type up in the old core. [non-rt]
   virtual bool is_dynamic() const noexcept { return false; }
 
+  /// [setup] Throws Error (out_of_range) as check_core_times().
+  void set_wcet_ns(CoreTimes times) {
+    check_core_times(implementation(), times);
+    wcet_ns_ = std::move(times);
+  }
+  /// The worst-case execution times of its methods, as far as they are declared. [rt]
+  const CoreTimes& wcet_ns() const MAUVE_RT { return wcet_ns_; }
+
   /// [setup]
   virtual void set_context(const Context* context) noexcept { context_ = context; }
   std::string description() const override { return "core " + implementation(); }
@@ -63,6 +73,7 @@ class CoreBase : public ComponentPart<CoreBase> {
 
  private:
   const Context* context_{nullptr};
+  CoreTimes wcet_ns_{};
 };
 
 /// Derive from this with the shell the core was written for (Listing 2 of the paper).

@@ -19,8 +19,8 @@ struct DeclaredState {
 };
 
 /// Checks the worst-case execution time of a state; 0: not declared. Throws Error (out_of_range) for a time that is no
-/// length of time, or is above the state's max_execution_ns (0: none). [setup]
+/// length of time, or is above the state's max_execution_ns (0: none). `core`: that declares it; empty: no core. [setup]
 void check_wcet(const std::string& state, time_ns_t wcet_ns, time_ns_t max_execution_ns,
-                const std::string& component = {});
+                const std::string& component = {}, const std::string& core = {});
 
 }  // namespace mauve

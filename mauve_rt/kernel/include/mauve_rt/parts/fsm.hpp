@@ -18,6 +18,7 @@
 #include "mauve_rt/parts/component_part.hpp"
 #include "mauve_rt/parts/core.hpp"
 #include "mauve_rt/parts/declared_state.hpp"
+#include "mauve_rt/parts/duration.hpp"
 #include "mauve_rt/parts/event_input.hpp"
 
 namespace mauve {
@@ -109,8 +110,10 @@ struct State {
   std::size_t index{0};  // in the order of declaration
   bool is_wait{false};
   time_ns_t duration_ns{0};             // of a wait; of an event wait its timeout; kForever: it has none
+  std::string duration_text;            // Duration::text of it
   std::unique_ptr<EventInput> event;    // of an event wait
   time_ns_t min_interarrival_ns{0};     // of an event wait: the least time from one release to the next
+  std::string min_interarrival_text;    // Duration::text of it
   std::size_t action{kNone};            // of an execution state
   time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
   time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
@@ -134,7 +137,19 @@ struct DescribedState {
   std::vector<std::string>
       successors{};      // in the order in which guards are asked; last the one without a guard
   time_ns_t wcet_ns{0};  // of an execution state: its worst case; 0: not declared
+  // The expressions of the two times above: `5 * unit_ms`; empty: a plain number of ns.
+  std::string duration_text{};
+  std::string min_interarrival_text{};
+  std::string action{};               // of an execution state: the core's method that it runs
+  std::vector<std::string> guards{};  // the core's methods, one for each successor but the last
+  std::string event_port{};           // of an event wait
+  std::string wcet_core{};  // the core that declares wcet_ns; empty: the architecture file or the fsm does
+  std::vector<std::string> methods_without_wcet{};  // of a core that declares times of others: wcet_ns is 0
 };
+
+/// Gives each execution state without a worst case the core's: the times of its action and of the guards that are asked after
+/// it. Where the core declares none of one of these methods, the state keeps none. `core`: its name. [non-rt]
+void add_core_times(std::vector<DescribedState>& states, const std::string& core, const CoreTimes& times);
 
 /// An fsm seen without its types.
 class FsmBase : public ComponentPart<FsmBase> {
@@ -175,12 +190,13 @@ class FsmBase : public ComponentPart<FsmBase> {
   virtual void define() = 0;
 
   /// A state that advances the clock by > 0 ns and sleeps until then. kForever: until the component is stopped; such a
-  /// state leads nowhere, and needs no next(). [setup]
-  State& wait(std::string name, time_ns_t duration_ns);
+  /// state leads nowhere, and needs no next(). `mauve::times(5, shell().unit_ms)` keeps its expression for descriptions. [setup]
+  State& wait(std::string name, const Duration& duration);
   /// Waits for a write to the resource that a read port is connected to. The clock goes on to the event's time, but
   /// by min_interarrival at least; or by the timeout when no event comes (kForever: an event alone ends it). Both > 0 ns.
   /// [setup]
-  State& wait_event(std::string name, PortBase& port, time_ns_t timeout_ns, time_ns_t min_interarrival_ns);
+  State& wait_event(std::string name, PortBase& port, const Duration& timeout,
+                    const Duration& min_interarrival);
   void set_initial(State& state) noexcept { initial_ = &state; }
   /// Where a state goes when no transition's guard holds. Every state needs one.
   void next(State& from, State& to) noexcept { from.next = &to; }

@@ -5,6 +5,7 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -71,6 +72,13 @@ using Wires = std::map<std::string, Wire>;
 
 class Architecture;
 class Component;
+
+/// What is shown of a core, also when the core itself is gone.
+struct ShownCore {
+  std::string name;
+  CoreTimes wcet_ns;
+  auto operator<=>(const ShownCore&) const = default;
+};
 
 /// New parts for a component: made ready while the old ones run, put in by a commit, the old ones retired after.
 class PartsChange final : public CommitAction {
@@ -149,7 +157,7 @@ class PartsChange final : public CommitAction {
   bool restarts_;
   std::unique_ptr<Handover> handover_{};  // from the core that ran when it was prepared
   const CoreBase* kept_core_{nullptr};    // the one that the binding was made for, when it stays
-  std::uint32_t core_name_{0};            // of the core that is not in force
+  const ShownCore* shown_core_{nullptr};  // of the core that is not in force
   bool fallen_back_{false};               // whether the component runs its fallback core, with that core
   std::shared_ptr<Probation> probation_{};
   bool afresh_{false};
@@ -212,6 +220,8 @@ struct ShownParts {
 /// | wires_           | changes, as they are made                 | ordinary threads    | the gate's mutex |
 /// | change_mark_     | changes                                   | anyone              | its own: commit_gate.hpp |
 /// | shown_           | who changed something, after the fact     | any ordinary thread | shown_mutex_     |
+/// | cores_           | who makes a change; none is erased        | ordinary threads    | shown_mutex_; a ShownCore is constant |
+/// | shown_core_, faulted_core_ | with parts_                     | anyone              | release/acquire: the ShownCore |
 /// | architecture_    | the architecture, with its lists          | any ordinary thread | release/acquire: it is there before it is asked |
 /// | spare_ ... fallback_ | changes and renewals                   | the same            | the claim of the component |
 /// | is_renewing_     | renewals, the component claimed           | anyone              | release/acquire: all that the renewal did |
@@ -268,7 +278,8 @@ class Component final : public Configurable {
 
   /// Names, wiring and property values now; unlike the parts themselves safe while they are being replaced. [non-rt]
   ShownParts shown() const;
-  /// Of the fsm. [non-rt]
+  /// Of the fsm, with the worst cases that the core in force declares where neither the settings nor the fsm declares one.
+  /// [non-rt]
   std::vector<DescribedState> described_states() const;
   /// The same before anything is configured: of an instance of the fsm made for that, where one can be made. [setup]
   /// Throws Error: it cannot be so.
@@ -425,6 +436,9 @@ class Component final : public Configurable {
   Architecture& require_listed() const;
   void bind_and_configure(CoreBase& core, Shell& shell, const FsmBase& fsm, CoreBinding& binding);
   CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
+  /// The fsm's states, with the core's worst cases. Throws Error (out_of_range): one is above the state's bound.
+  std::vector<DescribedState> states_of(const FsmBase& fsm, const CoreBase& core) const;
+  const ShownCore* keep_shown(const CoreBase& core);
   void bind_fsm(FsmBase& fsm, Shell& shell) const;
   void require_declared_states(const FsmBase& fsm) const;
   /// Refuses a shell whose messages do not fit on the task's stack. Throws Error (out_of_range).
@@ -465,8 +479,9 @@ class Component final : public Configurable {
 
   mutable Mutex shown_mutex_;
   ShownParts shown_ MAUVE_GUARDED_BY(shown_mutex_);
-  Atomic<std::uint32_t> core_name_{0};     // in the trace; set with the core, relaxed: a lone fact
-  Atomic<std::uint32_t> faulted_core_{0};  // the same of the one that the fallback took the place of last
+  std::set<ShownCore> cores_ MAUVE_GUARDED_BY(shown_mutex_);  // that are or were in force, or prepared for it
+  Atomic<const ShownCore*> shown_core_{nullptr};
+  Atomic<const ShownCore*> faulted_core_{nullptr};  // of the one that the fallback took the place of last
   std::shared_ptr<const StateTimes> shown_times_ MAUVE_GUARDED_BY(shown_mutex_);
   std::vector<DescribedState> shown_states_ MAUVE_GUARDED_BY(shown_mutex_);
   std::shared_ptr<Probation> probation_ MAUVE_GUARDED_BY(shown_mutex_);
