@@ -1,7 +1,8 @@
 # What ROS 2 and Python need of mauve_rt besides the kernel.
 
 mauve_install_python_package(mauve_rt)
-set(_templates "${PYTHON_INSTALL_DIR}/mauve_rt/scaffold/templates") # of `mauve new`
+# Of `mauve new`: there are folders among them that the package's own files are not installed from.
+set(_templates "${PYTHON_INSTALL_DIR}/mauve_rt/scaffold/templates")
 install(DIRECTORY mauve_rt/scaffold/templates/ DESTINATION "${_templates}")
 mauve_link_installed("${PROJECT_SOURCE_DIR}/mauve_rt/scaffold/templates" "${_templates}")
 mauve_register_package(mauve_rt)

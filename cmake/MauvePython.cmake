@@ -59,7 +59,7 @@ endfunction()
 function(mauve_install_python_package package)
   install(DIRECTORY "${PROJECT_SOURCE_DIR}/${package}/" DESTINATION "${PYTHON_INSTALL_DIR}/${package}"
     FILES_MATCHING
-    PATTERN "*.py" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json" PATTERN "*.css" PATTERN "*.js"
+    PATTERN "*.py" PATTERN "py.typed" PATTERN "*.yaml" PATTERN "*.json" PATTERN "*.css" PATTERN "*.js" PATTERN "*.j2"
     PATTERN "*.xml"
     PATTERN "__pycache__" EXCLUDE
     PATTERN "kernel" EXCLUDE PATTERN "bindings" EXCLUDE PATTERN "bridge/src" EXCLUDE PATTERN "bridge/include" EXCLUDE PATTERN "sentinel" EXCLUDE PATTERN "trace/keeper" EXCLUDE

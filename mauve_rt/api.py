@@ -33,7 +33,8 @@ from mauve_rt._kernel import (
 from mauve_rt.model.build import open_architecture
 from mauve_rt.parts.cores import Core
 from mauve_rt.parts.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
-from mauve_rt.parts.fsms import Fsm, State, times
+from mauve_rt.parts.fsms import Fsm, PeriodicFsm, State, times
+from mauve_rt.parts.model_core import ModelCore
 from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, Sample, WritePort
 from mauve_rt.parts.resources import (
     AnyResource,
@@ -68,7 +69,9 @@ __all__ = [
     "Host",
     "LatestValue",
     "MauveError",
+    "ModelCore",
     "NativeShell",
+    "PeriodicFsm",
     "PluginRegistry",
     "PortDescription",
     "Property",

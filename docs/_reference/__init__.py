@@ -25,6 +25,7 @@ def parts() -> Mapping[str, Callable[[], str]]:
         errors,
         headers,
         messages,
+        model_file,
         node_parameters,
         python_api,
         rules_file,
@@ -33,6 +34,7 @@ def parts() -> Mapping[str, Callable[[], str]]:
 
     return {
         "architecture_file": architecture_file.text,
+        "model_file": model_file.text,
         "rules_file": rules_file.rules,
         "steps_file": rules_file.steps,
         "script_file": rules_file.script,

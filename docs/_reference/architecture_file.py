@@ -1,9 +1,9 @@
 """The keys of architecture files, from the sections of mauve_rt/model/schema.py."""
 
 from _reference.tables import HEAD, section_table, setting_row, table
+from mauve_rt.file_schema.section import Section
 from mauve_rt.model import schema
 from mauve_rt.model.resource_kinds import given_kinds, parameter_setting
-from mauve_rt.model.section import Section
 
 # In the order of the page: the heading of each section, and where a file has it.
 SECTIONS: dict[type[Section], tuple[str, str]] = {

@@ -1,8 +1,8 @@
 """The keys of rules files, steps files and scripts, with the kinds of conditions and steps."""
 
 from _reference.tables import limits, section_table, sentence, shown, table
+from mauve_rt.file_schema.section import Section
 from mauve_rt.model import steps as steps_of_files
-from mauve_rt.model.section import Section
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.supervision.condition_table import choices, conditions
 from mauve_rt.supervision.rules import Rule, Rules, Undo

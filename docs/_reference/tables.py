@@ -5,8 +5,8 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from mauve_rt.model import kinds
-from mauve_rt.model.section import Part, Section, Setting
+from mauve_rt.file_schema import kinds
+from mauve_rt.file_schema.section import Part, Section, Setting
 
 _UNITS = {"ns": "ns", "us": "µs", "ms": "ms", "s": "s", "bytes": "bytes", "records": "records"}
 _HUGE = 1e12  # a bound that only keeps numbers within 64 bits
@@ -14,6 +14,11 @@ _WORDS = {  # of kinds without bounds; a new kind needs a line
     "Flag": "boolean",
     "Scalar": "boolean, number or text",
     "WhenPart": "[condition](#conditions)",
+    "_TypeName": "[type](#types)",
+    "_Duration": "[time](#times)",
+    "_Type": "mapping of fields to [types](#types), or [a struct in C++](#type-in-c)",
+    "_Call": "a service's type, or [a call in C++](#call-in-c)",
+    "_Next": "a state, or a list of `{if: GUARD, to: STATE}` and a state",
     "_StepPart": "[step](steps_file.md#step)",
 }
 HEAD = ("key", "type", "unit", "range", "default", "meaning")

@@ -56,6 +56,7 @@ class PythonFsm final : public FsmBase {
     }
     wait_event(name, *found, timeout, min_interarrival);
   }
+  void set_divisor(time_ns_t divisor_ns) { declare_divisor(divisor_ns); }
   void begin_with(const std::string& name) { set_initial(require(name)); }
   void go(const std::string& from, const std::string& to) { next(require(from), require(to)); }
   void go_if(const std::string& from, const std::string& guard, const std::string& to) {
@@ -116,6 +117,7 @@ void bind_python_fsm(py::module_& module) {
       .def("wait", &PythonFsm::add_wait, py::arg("name"), py::arg("duration"))
       .def("wait_event", &PythonFsm::add_event_wait, py::arg("name"), py::arg("port"), py::arg("timeout"),
            py::arg("min_interarrival"))
+      .def("divisor", &PythonFsm::set_divisor, py::arg("divisor_ns"), "Its period divides this, too.")
       .def("set_initial", &PythonFsm::begin_with, py::arg("state"))
       .def("next", &PythonFsm::go, py::arg("state"), py::arg("to"))
       .def("transition", &PythonFsm::go_if, py::arg("state"), py::arg("guard"), py::arg("to"));

@@ -4,7 +4,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +16,7 @@ from mauve_rt.unfinished import beside
 if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Subject
     from mauve_rt.analysis.machines import ExecutionTime, Machine
+    from mauve_rt.modelling.package_model import PackageModel
     from mauve_rt.trace.reading.statistics import Distribution
 
     Budgets = Mapping[str, ExecutionTime]
@@ -27,6 +28,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """What to analyze, and where missing times come from."""
     parser.add_argument(
         "target", metavar="FILE|NODE|BAG", help="an architecture file, the node of an executor, or a bag"
+    )
+    parser.add_argument(
+        "--model",
+        type=Path,
+        action="append",
+        default=[],
+        metavar="MODEL",
+        help="take parts of an architecture FILE from this model of a package; may be repeated",
     )
     parser.add_argument(
         "--budget-from",
@@ -86,7 +95,7 @@ def main(args: argparse.Namespace) -> int:
     if args.write and (args.budget_from is None or not Path(args.target).is_file()):
         print("mauve: --write: expected an architecture FILE and --budget-from BAG", file=sys.stderr)
         return BAD_USAGE
-    machines, sender_priority = _machines(args.target)
+    machines, sender_priority = _machines(args.target, args.model)
     if args.budget_from is not None:
         budgets, holds = _budgets(args.budget_from, args.margin)
         declared, machines = machines, [one.with_budgets(budgets.get(one.name, {})) for one in machines]
@@ -99,6 +108,10 @@ def main(args: argparse.Namespace) -> int:
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
     verdict = judge(subjects, bounds, wakeup_ns=wakeup_ns)
     assumptions = [*assumptions_about(machines, wakeup_us=args.wakeup_us, sender_priority=sender_priority)]
+    assumptions += [
+        f"the parts of {path} are written in C++, but for implementations with a module"
+        for path in args.model
+    ]
     if args.json:
         parts = [{**_as_json(subject), "response": asdict(bounds[subject.name])} for subject in subjects]
         judged = {"outcome": verdict.outcome, "sentence": verdict.sentence}
@@ -117,28 +130,35 @@ def main(args: argparse.Namespace) -> int:
     return statuses.get(verdict.outcome, NOT_PROVED)
 
 
-def _machines(target: str) -> "tuple[list[Machine], int]":
+def _machines(target: str, models: Sequence[Path]) -> "tuple[list[Machine], int]":
     """The components of what is named, and the priority of the executor's sender."""
     path = Path(target)
     if not path.exists() and target.startswith("/"):
         return _of_node(target), 1
     if path.is_dir() or path.suffix in (".mcap", ".db3"):
         return _of_bag(path), 1
-    return _of_file(path)
+    return _of_file(path, models)
 
 
-def _of_file(path: Path) -> "tuple[list[Machine], int]":
+def _of_file(path: Path, models: Sequence[Path]) -> "tuple[list[Machine], int]":
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.analysis.machines import Machine  # noqa: PLC0415
     from mauve_rt.model import PluginIndex, build, load_architecture, previewed_states  # noqa: PLC0415
+    from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
+    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
 
     model = load_architecture(path)
-    index = PluginIndex.installed()
-    architecture = build(model, PluginRegistry(), index=index)
+    registry, index = PluginRegistry(), PluginIndex.installed()
+    in_python: dict[str, bool] = {}
+    for each in models:
+        found = load_model(each)
+        index = add_modelled_parts(found, registry, index)
+        in_python |= _modelled(found)
+    architecture = build(model, registry, index=index)
     states = previewed_states(model, architecture)
     kinds = {resource.name: resource.kind for resource in architecture.resources()}
     machines = [
-        Machine.of(part, states=states[part.name], is_python=_is_python(part, index), kinds=kinds)
+        Machine.of(part, states=states[part.name], is_python=_is_python(part, index, in_python), kinds=kinds)
         for part in architecture.components()
     ]
     return machines, model.sender.priority
@@ -171,10 +191,23 @@ def _of_told(components: Iterable[Any], kinds: Mapping[str, str]) -> "list[Machi
     return [Machine.of(part, is_python=_is_python(part, index), kinds=kinds) for part in components]
 
 
-def _is_python(part: Any, index: Any) -> bool | None:
+def _modelled(model: "PackageModel") -> dict[str, bool]:
+    """The parts of a model by their names, and whether they are said to be in Python."""
+    content = model.content
+    parts = dict.fromkeys((*content.shells, *content.fsms), False)
+    for core in content.cores.values():
+        parts |= {name: bool(one.module) for name, one in core.implementations.items()}
+    return {model.registered(name): is_python for name, is_python in parts.items()}
+
+
+def _is_python(part: Any, index: Any, modelled: Mapping[str, bool] | None = None) -> bool | None:
+    """Whether one of its parts is in Python; None: not known. `modelled`: of parts that a model describes."""
+    known = modelled or {}
     named = (("shell", part.shell), ("core", part.core), ("fsm", part.fsm))
-    plugins = [index.find(kind, name) for kind, name in named]
-    if any(plugin is not None and plugin.is_python for plugin in plugins):
+    plugins = [index.find(kind, name) for kind, name in named if name not in known]
+    if any(known.get(name) for _, name in named) or any(
+        each is not None and each.is_python for each in plugins
+    ):
         return True
     return None if None in plugins else False
 

@@ -1,6 +1,7 @@
-"""`mauve check FILE...`: what is wrong with architecture, rules and steps files, without starting anything.
+"""`mauve check FILE...`: what is wrong with models, architecture, rules and steps files; nothing is started.
 
-What a file is its contents say. Beside an architecture file, steps and rules are tried on it as well.
+What a file is its contents say. Beside an architecture file, steps and rules are tried on it as well. Of the
+models that are given with it an architecture may use parts that are not written yet.
 """
 
 import argparse
@@ -13,7 +14,11 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
+    from collections.abc import Iterable
+
+    from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
+    from mauve_rt.modelling.package_model import PackageModel
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -23,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help="files of an architecture, rules or steps; given together with an architecture file, rules and "
-        "steps are tried on it",
+        help="models, and files of an architecture, rules or steps; beside an architecture file, "
+        "steps and rules are tried on it, and models give it parts",
     )
 
 
@@ -43,10 +48,14 @@ def main(args: argparse.Namespace) -> int:
         print("mauve: check steps and rules with one architecture file, not with several", file=sys.stderr)
         return BAD_USAGE
     status, model = OK, None
-    for path in (*architectures, *(path for path in kinds if path not in architectures)):
+    models: list[PackageModel] = []
+    order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
+    for path in sorted(kinds, key=lambda path: order.index(kinds[path])):
         try:
-            if kinds[path] is FileKind.ARCHITECTURE:
-                model = _check_architecture(path)
+            if kinds[path] is FileKind.MODEL:
+                models.append(_check_model(path))
+            elif kinds[path] is FileKind.ARCHITECTURE:
+                model = _check_architecture(path, models)
             else:
                 (_check_rules if kinds[path] is FileKind.RULES else _check_steps)(path, model)
         except ArchitectureFileError as error:
@@ -59,22 +68,41 @@ def _tell(error: ArchitectureFileError) -> int:
     return BAD_USAGE
 
 
-def _check_architecture(path: Path) -> "ArchitectureModel":
+def _check_model(path: Path) -> "PackageModel":
+    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+
+    model = load_model(path)
+    _warn(path, model.warnings)
+    content = model.content
+    counts = {"shell": len(content.shells), "core": len(content.cores), "fsm": len(content.fsms)}
+    found = ", ".join(counted(count, what) for what, count in counts.items())
+    print(f"{path}: {found}: no error found")
+    return model
+
+
+def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
+    for warning in warnings:
+        print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
+
+
+def _check_architecture(path: Path, models: "Iterable[PackageModel]") -> "ArchitectureModel":
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
-    from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
+    from mauve_rt.model import PluginIndex, build, configure, load_architecture  # noqa: PLC0415
+    from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
     from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
-    registry = PluginRegistry()
-    architecture = build(model, registry)
+    registry, index = PluginRegistry(), PluginIndex.installed()
+    for each in models:
+        index = add_modelled_parts(each, registry, index)
+    architecture = build(model, registry, index=index)
     configure(model, architecture)
     architecture.cleanup()
     if late := late_writers(model):
         raise ArchitectureFileError(path, late)
-    for warning in file_warnings(model):
-        print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
+    _warn(path, file_warnings(model))
     counts = {
         "component": len(model.components),
         "resource": len(model.resources),

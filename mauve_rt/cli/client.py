@@ -119,7 +119,7 @@ class Client:
         )
 
     def _missing(self, service: str) -> str:
-        from mauve_rt.model.words import did_you_mean  # noqa: PLC0415 - takes its time to load
+        from mauve_rt.file_schema.words import did_you_mean  # noqa: PLC0415 - takes its time to load
 
         asked, _, name = service.rpartition("/")
         domain = f"ROS_DOMAIN_ID {self._discovery.domain}"

@@ -12,7 +12,9 @@ from mauve_rt.cli import (
     check_verb,
     dev_verb,
     echo_verb,
+    generate_verb,
     mirror_verb,
+    model_verb,
     new_verb,
     plugins_verb,
     report_verb,
@@ -535,5 +537,17 @@ VERBS = (
         "show the types of data that plug-ins register, and write them as .msg files",
         types_verb.add_arguments,
         types_verb.main,
+    ),
+    Verb(
+        "generate",
+        "write the code of a package's model, and skeletons of its algorithms",
+        generate_verb.add_arguments,
+        generate_verb.main,
+    ),
+    Verb(
+        "model",
+        "print the model of the parts that an installed package registers",
+        model_verb.add_arguments,
+        model_verb.main,
     ),
 )

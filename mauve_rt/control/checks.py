@@ -5,9 +5,9 @@ import math
 from mauve_rt._kernel import ComponentDescription
 from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, ReloadOrder, Request
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
-from mauve_rt.model.words import did_you_mean, shown
 
 MAX_TIMEOUT_S = 10.0
 MAX_TEXT = 1000

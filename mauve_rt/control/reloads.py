@@ -8,13 +8,13 @@ from mauve_rt._kernel import ComponentDescription, Transaction
 from mauve_rt.control.requests import BY_RELOAD, Code, RefusalError, ReloadOrder
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.counts import counted
+from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model import PluginLoader
 from mauve_rt.model.code_layouts import shell_layout
 from mauve_rt.model.generations import Generation, Name, Source, names_of
 from mauve_rt.model.probation import Probation, read_probation
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.steps import Step
-from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.yaml.text import YamlError, read_yaml
 
 _PARTS = ("shell", "fsm", "core")

@@ -10,8 +10,8 @@ from typing import Any, Protocol
 from mauve_msgs.msg import ReplyCode
 from mauve_rt._kernel import ERROR_REPLIES, NOT_MEASURED
 from mauve_rt.errors import error_code
+from mauve_rt.file_schema.words import cut
 from mauve_rt.model.steps import SHOWN_STEP, Step
-from mauve_rt.model.words import cut
 
 __all__ = [
     "NOT_MEASURED",

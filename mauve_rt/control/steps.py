@@ -29,6 +29,7 @@ from mauve_rt.control.limits import RequestLimits, bytes_of_component, bytes_of_
 from mauve_rt.control.requests import Code, RefusalError, code_of
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
+from mauve_rt.file_schema.words import did_you_mean, shown, some
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
 from mauve_rt.model.checks import Checks, property_mismatch
@@ -40,7 +41,6 @@ from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
 from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
 from mauve_rt.model.steps import Step
-from mauve_rt.model.words import did_you_mean, shown, some
 from mauve_rt.yaml.text import YamlError, read_yaml
 
 _TOLD_PROBLEMS = 10

@@ -6,8 +6,8 @@ from typing import NamedTuple
 from mauve_rt._kernel import ComponentDescription, MessageShape, ResourceDescription
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError
+from mauve_rt.file_schema.words import did_you_mean, listed
 from mauve_rt.model.message_text import message_text
-from mauve_rt.model.words import did_you_mean, listed
 
 MOST_VALUES = 256
 """Of one request."""

@@ -7,7 +7,7 @@ from mauve_msgs.msg import LateComponent, OpenChange
 from mauve_rt._kernel import OpenChange as OpenChangeFacts
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.runtime import Runtime
-from mauve_rt.model.words import cut
+from mauve_rt.file_schema.words import cut
 
 PHASES = {OpenChange.PREPARING: "preparing", OpenChange.WAITING: "waiting", OpenChange.MADE: "made"}
 _NUMBERS = {name: number for number, name in PHASES.items()}

@@ -32,8 +32,8 @@ from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.control.wishes import step_of
+from mauve_rt.file_schema.words import cut, shown
 from mauve_rt.model.schema import PropertyValue
-from mauve_rt.model.words import cut, shown
 
 _PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
 _MAX_PRIORITY = 255

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.file_schema.schema_errors import owner, read_content
+from mauve_rt.file_schema.words import did_you_mean, listed
+from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
 from mauve_rt.model.schema import ComponentModel, FileModel, PropertyValue, ResourceModel
-from mauve_rt.model.schema_errors import owner, read_content
 from mauve_rt.model.substitution import substituted_property
-from mauve_rt.model.words import did_you_mean, listed
-from mauve_rt.model.yaml_file import Location, YamlFile
 
 
 @dataclass(frozen=True, kw_only=True)

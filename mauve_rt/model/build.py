@@ -7,12 +7,12 @@ from typing import Any
 
 from mauve_rt._kernel import Architecture, DescribedState, PluginRegistry, Transaction
 from mauve_rt.errors import ArchitectureFileError, MauveError
+from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model.architecture_file import ArchitectureModel, load_architecture
 from mauve_rt.model.checks import Checks
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
 from mauve_rt.model.resource_parts import resource_part
 from mauve_rt.model.schema import ComponentModel
-from mauve_rt.model.yaml_file import Location
 
 
 def build(

@@ -11,17 +11,17 @@ from mauve_rt._kernel import (
     ShellDescription,
 )
 from mauve_rt.errors import ArchitectureFileError, MauveError, PluginError, PortTypeError, Problem
+from mauve_rt.file_schema.kinds import Faults
+from mauve_rt.file_schema.schema_errors import fault_problem
+from mauve_rt.file_schema.words import did_you_mean, shown
+from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
-from mauve_rt.model.kinds import Faults
 from mauve_rt.model.message_shapes import REMEDY, message_definition, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
 from mauve_rt.model.resource_kinds import capacities, given_kinds, read_parameters
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import PropertyValue, ResourceModel
-from mauve_rt.model.schema_errors import fault_problem
-from mauve_rt.model.words import did_you_mean, shown
-from mauve_rt.model.yaml_file import Location
-from mauve_rt.parts.message_types import message_class, service_class
+from mauve_rt.parts.message_types import is_message, service_class
 
 
 class Checks:
@@ -122,7 +122,7 @@ class Checks:
         if plugin is None or not plugin.is_python or shell != self._model.components[component].shell:
             return
         for port in ports:
-            if port.kind in ("read", "write") and port.required and message_class(port.type) is None:
+            if port.kind in ("read", "write") and port.required and not is_message(port.type):
                 error = PortTypeError(port.name, port.type, core=f"'{core}'")
                 yield self._model.problem(place, str(error), code=error.code)
 
@@ -183,7 +183,7 @@ class Checks:
             remedy = did_you_mean(resource.type, self._loader.names(type_kind)) if is_unknown else ""
             yield self._model.problem((*place, about), what, remedy=remedy, code=error.code)
             return
-        if resource.topic is not None and message_class(self._resources[name].type) is None:
+        if resource.topic is not None and not is_message(self._resources[name].type):
             what = (
                 f"resource '{name}' is bound to topic '{resource.topic.name}', but its type is no ROS message"
             )

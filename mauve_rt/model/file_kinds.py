@@ -3,7 +3,7 @@
 from enum import Enum
 from pathlib import Path
 
-from mauve_rt.model.yaml_file import YamlFile
+from mauve_rt.file_schema.yaml_file import YamlFile
 
 
 class FileKind(Enum):
@@ -12,12 +12,14 @@ class FileKind(Enum):
     ARCHITECTURE = "architecture"
     RULES = "rules"
     STEPS = "steps"
+    MODEL = "model"
 
 
 def file_kind(path: str | Path) -> FileKind:
     """The kind of a file.
 
-    Steps are a list or have the key `steps`, rules have `rules`; all else is to be an architecture.
+    Steps are a list or have the key `steps`, rules have `rules`, the model of a package has `mauve_model`;
+    all else is to be an architecture.
 
     Raises:
         ArchitectureFileError: it cannot be read or is no YAML.
@@ -25,6 +27,8 @@ def file_kind(path: str | Path) -> FileKind:
     data = YamlFile(path).data
     if isinstance(data, list):
         return FileKind.STEPS
+    if isinstance(data, dict) and "mauve_model" in data:
+        return FileKind.MODEL
     if isinstance(data, dict) and "components" not in data:
         if "rules" in data:
             return FileKind.RULES

@@ -1,10 +1,10 @@
 """A component or a resource more for an architecture that runs, described as in the architecture file."""
 
 from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.file_schema.schema_errors import read_content
+from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.architecture_file import ArchitectureModel, Overrides, element_problems
 from mauve_rt.model.schema import FragmentModel
-from mauve_rt.model.schema_errors import read_content
-from mauve_rt.model.yaml_file import Location, YamlFile
 
 
 class _Section(YamlFile):

@@ -3,8 +3,8 @@
 from typing import Any
 
 from mauve_rt._kernel import TASK_SETTINGS
-from mauve_rt.model.kinds import Choice, Kind, ListOf, Real, Whole
-from mauve_rt.model.section import Setting
+from mauve_rt.file_schema.kinds import Choice, Kind, ListOf, Real, Whole
+from mauve_rt.file_schema.section import Setting
 
 _NS_PER_MS = 1e6
 _INT_MAX = 2**31 - 1

@@ -20,9 +20,9 @@ from typing import Any, ClassVar, Self
 
 from mauve_rt._kernel import PluginRegistry, given_resource_kinds
 from mauve_rt.errors import MauveError, PluginError, exception_text, one_line
+from mauve_rt.file_schema.words import did_you_mean, nearest, shown
 from mauve_rt.model.generations import CodeGenerations, Generation, Name, Source
 from mauve_rt.model.loaded_code import REMEDY, LoadedCode, Stamp
-from mauve_rt.model.words import did_you_mean, nearest, shown
 from mauve_rt.parts import ament_index
 
 INDEX_RESOURCE = "mauve_rt_plugins"
@@ -126,6 +126,11 @@ class PluginIndex:
         index._read = read
         return index
 
+    def without(self, package: str) -> Self:
+        """The same but for what has names of a package."""
+        others = (each for each in self if each.name.partition("/")[0] != package)
+        return type(self)(others, self.complaints)
+
     @property
     def is_stale(self) -> bool:
         """Whether the ament index lists something else by now; never, of one that was not read from there."""
@@ -208,6 +213,15 @@ class PluginLoader:
         if name not in self.registry.names(kind):
             remedy = "correct the package's list of plug-ins"
             raise PluginError(f"{plugin.library} has no {kind} '{name}'", element=name, remedy=remedy)
+
+    def python_class(self, kind: str, name: str) -> Any:
+        """The class of a plug-in in Python; None of one that is not installed so.
+
+        Raises:
+            PluginError: it cannot be loaded.
+        """
+        plugin = self.index.find(kind, name)
+        return _python_class(plugin, self.generations) if plugin is not None and plugin.is_python else None
 
     def loaded_sources(self) -> list[Source]:
         """The libraries and modules that plug-ins were loaded from, with what they register."""

@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from mauve_rt._kernel import FieldShape, OutputLimit, PortDescription, ProbationOptions
-from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.file_schema.words import did_you_mean, shown
 
 MAX_PROBATION_S = 86_400.0
 MAX_VIOLATIONS = 50

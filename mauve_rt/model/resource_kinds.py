@@ -5,9 +5,9 @@ from functools import cache
 from typing import Any
 
 from mauve_rt._kernel import ResourceKind, ResourceParameter, given_resource_kinds
-from mauve_rt.model.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
-from mauve_rt.model.section import Setting
-from mauve_rt.model.yaml_file import Location
+from mauve_rt.file_schema.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
+from mauve_rt.file_schema.section import Setting
+from mauve_rt.file_schema.yaml_file import Location
 
 _INT64 = 2**63
 _CAPACITY = "capacity"  # with a field behind a point, or as a mapping by fields: of sequences of the type

@@ -5,7 +5,7 @@ from typing import Any
 from mauve_rt._kernel import PluginRegistry, ResourceDescription
 from mauve_rt.model.resource_kinds import has_key
 from mauve_rt.model.schema import ResourceModel
-from mauve_rt.parts.message_types import message_class
+from mauve_rt.parts.message_types import is_message
 
 
 def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str, Any]:
@@ -16,7 +16,7 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
     if resource.service is not None and resource.service.timeout_ms is not None:
         parameters["timeout_ns"] = round(resource.service.timeout_ms * 1e6)
     can_be_serialized = has_key(registry.resource_kind(kind), "max_bytes")
-    if can_be_serialized and name not in registry.names("type") and message_class(name):
+    if can_be_serialized and name not in registry.names("type") and is_message(name):
         return {"resource": DataOfKind(kind, name, **parameters)}
     return {"kind": kind, "type": name, **parameters}
 

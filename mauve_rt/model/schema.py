@@ -31,8 +31,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 from mauve_rt._kernel import TASK_SETTINGS
-from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
-from mauve_rt.model.kinds import (
+from mauve_rt.file_schema.kinds import (
     Choice,
     Fault,
     Faults,
@@ -44,10 +43,11 @@ from mauve_rt.model.kinds import (
     Text,
     Whole,
 )
+from mauve_rt.file_schema.section import Part, Section, setting
+from mauve_rt.file_schema.words import listed
+from mauve_rt.file_schema.yaml_file import Location
+from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
 from mauve_rt.model.resource_kinds import given_kinds, read_parameters
-from mauve_rt.model.section import Part, Section, setting
-from mauve_rt.model.words import listed
-from mauve_rt.model.yaml_file import Location
 
 PropertyValue = bool | int | float | str
 

@@ -15,13 +15,13 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text
+from mauve_rt.file_schema.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text
+from mauve_rt.file_schema.schema_errors import expected
+from mauve_rt.file_schema.section import Section, setting
+from mauve_rt.file_schema.words import cut, did_you_mean, nearest, shown
+from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.schema import IDENTIFIER_OR_NONE
-from mauve_rt.model.schema_errors import expected
-from mauve_rt.model.section import Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.words import cut, did_you_mean, nearest, shown
-from mauve_rt.model.yaml_file import Location, YamlFile
 
 _SHOWN_VALUE = 60
 SHOWN_STEP = 300

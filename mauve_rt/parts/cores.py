@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, get_args
 
 from mauve_rt._kernel import PartFactory, ShellView
 from mauve_rt.errors import PortTypeError
-from mauve_rt.parts.messages import message_class
+from mauve_rt.parts.message_types import is_message
 from mauve_rt.parts.part import Configurable, implementation_name
 from mauve_rt.parts.ports import Property, ReadPort, Sample, WritePort
 from mauve_rt.parts.shells import Shell, shell_of
@@ -109,7 +109,7 @@ def require_served(view: ShellView, core: str) -> None:
     for port in view.ports():
         if port.kind not in ("read", "write") or not (port.required or port.resource):
             continue
-        if message_class(port.type) is None:
+        if not is_message(port.type):
             raise PortTypeError(port.name, port.type, core=core)
 
 

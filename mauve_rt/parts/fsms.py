@@ -31,7 +31,7 @@ else:
 
     CoreT = TypeVar("CoreT")
 
-__all__ = ["Duration", "Fsm", "State", "times"]
+__all__ = ["Duration", "Fsm", "PeriodicFsm", "State", "times"]
 
 
 def times(factor: int, property: Property[int]) -> Duration:  # noqa: A002 - the word of the shell
@@ -143,6 +143,50 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
     @classmethod
     def _make(cls, view: ShellView) -> "Fsm[Any, Any]":
         return cls(shell_of(view))
+
+
+class PeriodicFsm(Fsm[ShellT, CoreT], Generic[ShellT, CoreT]):
+    """A machine that executes one state in each period, as in C++ (Fig. 2 of the paper).
+
+    A state S becomes an execution state S and a wait "AwaitS" of one period before it: guards are asked right
+    after the action, and what they choose is executed one period later.
+    """
+
+    _period = Duration(0)
+
+    def period(self, period_ns: int | Duration) -> None:
+        """The one period of all states. Called once, before the first state."""
+        self._period = _duration(period_ns)
+        self._machine.divisor(self._period.ns)
+
+    def periodic_state(
+        self, name: str, method: str | Callable[[CoreT], object], *, max_execution_ns: int = 0
+    ) -> State:
+        """A state that runs a method of the core. Where no guard holds and next() says nothing, it stays.
+
+        Raises:
+            RuntimeError: period() was not called.
+        """
+        if self._period.ns == 0:
+            raise RuntimeError("the period is not given; call period() before the first state")
+        state, release = State(name), self.wait(_release_of(name), self._period)
+        self.execution(name, method, max_execution_ns=max_execution_ns)
+        super().next(release, state)
+        super().next(state, release)
+        return state
+
+    def next(self, state: State, to: State) -> None:
+        """Where a state goes when no transition's guard holds."""
+        super().next(state, State(_release_of(to.name)))
+
+    def transition(self, state: State, guard: str | Callable[[CoreT], bool], to: State) -> None:
+        """Go to `to` when the guard holds after the action; guards are asked in the order of declaration."""
+        super().transition(state, guard, State(_release_of(to.name)))
+
+
+def _release_of(name: str) -> str:
+    """The wait before an action."""
+    return f"Await{name}"
 
 
 def _method_name(method: str | Callable[..., object]) -> str:

@@ -16,6 +16,24 @@ from mauve_rt.parts import ament_index
 INDEX_RESOURCE = "rosidl_interfaces"
 
 
+_PROMISED: set[str] = set()
+
+
+def promise(names: Iterable[str]) -> None:
+    """Treat these as messages of which only the name is known: a model's, before they are generated."""
+    _PROMISED.update(names)
+
+
+def is_promised(name: str) -> bool:
+    """Whether it is a message that a model promises, and that is not installed."""
+    return name in _PROMISED and message_class(name) is None
+
+
+def is_message(name: str) -> bool:
+    """Whether it is the name of a message, installed or promised."""
+    return name in _PROMISED or message_class(name) is not None
+
+
 def message_class(name: str) -> Any:
     """The Python class of `package/msg/Name`; None when it is no installed ROS message."""
     found = _interface(name, "msg")

@@ -2,9 +2,12 @@
 
 from typing import Any
 
-from mauve_rt.parts.message_types import message_class
+from mauve_rt.parts.message_types import is_promised, message_class
 
 __all__ = ["deserialize", "message_class", "serialize", "type_name", "zero"]
+
+
+_EMPTY = b"\0\1\0\0"  # CDR's header alone
 
 
 def type_name(type_or_name: Any) -> str:
@@ -24,7 +27,9 @@ def type_name(type_or_name: Any) -> str:
 def zero(name: str) -> bytes | None:
     """The serialized message with every field at its default; None when the type is no installed message."""
     found = message_class(name)
-    return None if found is None else serialize(found())
+    if found is None:
+        return _EMPTY if is_promised(name) else None
+    return serialize(found())
 
 
 def serialize(message: Any) -> bytes:

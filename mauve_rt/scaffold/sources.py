@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, ParameterError
+from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.file_kinds import FileKind, file_kind
-from mauve_rt.model.yaml_file import YamlFile
 
 _CPP_SHELL = re.compile(
     r"\b(?:struct|class)\s+(\w+)\s*(?:final\s*)?:\s*(?:public\s+)?[\w:]*Shell\b[^{]*\{(.*?)^\};",

@@ -5,7 +5,7 @@ from types import MappingProxyType
 from typing import Any
 
 from mauve_rt._kernel import ConditionKind, ConditionParameter, condition_kinds
-from mauve_rt.model.kinds import Choice, Flag, Kind, Real, Text, Whole
+from mauve_rt.file_schema.kinds import Choice, Flag, Kind, Real, Text, Whole
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 
 __all__ = [

@@ -12,9 +12,9 @@ from mauve_rt.control.no_ros import NoRos
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.control.wishes import assignment_of
 from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.steps import Change, Step, place_of_step
-from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.supervision.rule_hearing import own_leaves, unobservable
 from mauve_rt.supervision.rule_names import full_name, leaf_findings
 from mauve_rt.supervision.rules import RulesFile

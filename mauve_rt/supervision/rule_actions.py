@@ -9,11 +9,11 @@ from mauve_rt.control.requests import RefusalError
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.steps import Plan
 from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model.plugins import PluginIndex
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
-from mauve_rt.model.yaml_file import Location
 from mauve_rt.supervision.rules import Rule, RulesFile
 
 UNPREPARED = "the executor cannot make a step of kind {} ready for a rule"

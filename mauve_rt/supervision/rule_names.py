@@ -6,10 +6,10 @@ from math import isinf
 from typing import Any
 
 from mauve_rt.errors import Problem
+from mauve_rt.file_schema.words import did_you_mean
+from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.schema import ResourceModel
-from mauve_rt.model.words import did_you_mean
-from mauve_rt.model.yaml_file import Location
 from mauve_rt.parts.message_types import message_class
 from mauve_rt.supervision.condition_table import roles
 from mauve_rt.supervision.message_fields import NUMBERS, field_type

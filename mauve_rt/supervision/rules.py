@@ -28,12 +28,12 @@ from pathlib import Path
 from typing import Literal
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Faults, Flag, ListOf, Real, Whole
+from mauve_rt.file_schema.kinds import Choice, Faults, Flag, ListOf, Real, Whole
+from mauve_rt.file_schema.section import Part, Section, setting
+from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
-from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import ANY_STEPS, STEPS, Step, dotted, form_error
-from mauve_rt.model.yaml_file import Location, YamlFile
 from mauve_rt.supervision.outside import inside_only
 from mauve_rt.supervision.when import When, WhenPart
 from mauve_rt.supervision.when_spec import refusal

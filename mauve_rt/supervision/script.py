@@ -20,12 +20,12 @@ from typing import Literal
 
 from mauve_rt._kernel import SignalSpec
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Choice, Fault, Faults, ListOf, Real, Text
+from mauve_rt.file_schema.kinds import Choice, Fault, Faults, ListOf, Real, Text
+from mauve_rt.file_schema.section import Part, Section, setting
+from mauve_rt.file_schema.words import did_you_mean, listed
+from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.schema import ROS_NAME
-from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.steps import form_error
-from mauve_rt.model.words import did_you_mean, listed
-from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.supervision.when_spec import OF_TOPICS, heard

@@ -13,13 +13,13 @@ from mauve_rt._kernel import PluginRegistry, Simulation
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.control.wishes import assignment_of
 from mauve_rt.errors import MauveError
+from mauve_rt.file_schema.schema_errors import read_content
+from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.architecture_file import ArchitectureModel, Overrides
 from mauve_rt.model.plugins import PluginIndex, PluginLoader
 from mauve_rt.model.schema import FragmentModel, PropertyValue
-from mauve_rt.model.schema_errors import read_content
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
-from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.parts.cores import Core
 from mauve_rt.parts.fsms import Fsm
 from mauve_rt.parts.ports import Property, ReadPort, WritePort

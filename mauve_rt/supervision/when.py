@@ -14,8 +14,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from mauve_rt.model.kinds import Fault, Faults, Kind, ListOf, Real, Whole
-from mauve_rt.model.yaml_file import Location
+from mauve_rt.file_schema.kinds import Fault, Faults, Kind, ListOf, Real, Whole
+from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.supervision.condition_table import conditions, parameter_kind, parameters_of
 
 ALL, ANY, NOT, AT_LEAST = "all", "any", "not", "at_least"

@@ -10,9 +10,9 @@ from rclpy.validate_topic_name import validate_topic_name
 from mauve_rt._bridge import FlatNumbers
 from mauve_rt.control.values import Values, read_shapes
 from mauve_rt.errors import MauveError, one_line
+from mauve_rt.file_schema.words import did_you_mean
 from mauve_rt.model.flat_fields import flat_fields
 from mauve_rt.model.schema import DEFAULT_MIRROR_HZ, MAX_MIRROR_HZ, MirrorModel
-from mauve_rt.model.words import did_you_mean
 from mauve_rt.node.executor.bound_resources import BoundResources, Mirrored
 from mauve_rt.parts.message_types import message_class
 

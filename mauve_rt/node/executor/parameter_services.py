@@ -23,9 +23,9 @@ from rclpy.parameter import Parameter
 from rclpy.qos import qos_profile_parameters
 
 from mauve_rt.control.requests import Outcome, Request
+from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.steps import Step
-from mauve_rt.model.words import did_you_mean, shown
 from mauve_rt.node.executor.parameters import Parameters
 from mauve_rt.node.shared.settings import QOS_OVERRIDES, no_qos_overrides
 

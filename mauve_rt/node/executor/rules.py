@@ -13,8 +13,8 @@ from mauve_rt._kernel import KEPT, Overlay, RuleFacts, RuleRunner, ToldDecision,
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
+from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.yaml_file import YamlFile
 from mauve_rt.node.shared.watch import Watch
 
 if TYPE_CHECKING:  # an executor without rules has no use for these, a tenth of its modules

@@ -10,8 +10,8 @@ from mauve_rt._kernel import TASK_SETTINGS
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError, ParameterError
+from mauve_rt.file_schema.words import shown
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
-from mauve_rt.model.words import shown
 from mauve_rt.node.shared.ros_arguments import RosArguments, parse_ros_arguments
 from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage, values_of
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any, Literal, NamedTuple
 
 from mauve_rt.errors import ParameterError
-from mauve_rt.model.words import did_you_mean, shown
+from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.node.shared.ros_arguments import RosArguments
 
 QOS_OVERRIDES = "qos_overrides."

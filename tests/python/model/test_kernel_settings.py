@@ -6,8 +6,8 @@ import pytest
 from python_parts import ActFsm, CountCore, CountShell
 
 from mauve_rt._kernel import TASK_SETTINGS, Architecture, MauveError, PluginRegistry
+from mauve_rt.file_schema.kinds import Faults
 from mauve_rt.model.kernel_settings import KernelSetting
-from mauve_rt.model.kinds import Faults
 from mauve_rt.model.schema import ComponentModel
 
 IN_FILES = {

@@ -8,9 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.file_schema.kinds import Choice, Faults, Flag, Kind, ListOf, Real, TableOf, Text, Whole
+from mauve_rt.file_schema.section import Part, Section, setting
 from mauve_rt.model import load_architecture, schema, steps
-from mauve_rt.model.kinds import Choice, Faults, Flag, Kind, ListOf, Real, TableOf, Text, Whole
-from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.supervision import rules
 
 SECTIONS = sorted(

@@ -25,6 +25,8 @@ from mauve_rt.api import (
     Host,
     LatestValue,
     MauveError,
+    ModelCore,
+    PeriodicFsm,
     PluginRegistry,
     Property,
     ReadPort,
@@ -173,6 +175,22 @@ class EventFsm(Fsm[HoverShell, HoverCore]):
         self.next(heard, also)
         self.next(also, heard)
         self.wait_event("Wrong", self.shell.target, 1, 1)  # type: ignore[arg-type]
+
+
+class Modelled(ModelCore[HoverShell]):
+    actions = ("follow",)
+
+    def follow(self) -> None: ...
+
+
+class Periodic(PeriodicFsm[HoverShell, Modelled]):
+    def define(self) -> None:
+        self.period(times(5, self.shell.tries))
+        follow = self.periodic_state("Follow", Modelled.follow, max_execution_ns=us_to_ns(500))
+        assert_type(follow, State)
+        self.set_initial(follow)
+        self.next(follow, follow)
+        self.periodic_state("Wrong", OtherCore.act)  # type: ignore[arg-type]
 
 
 def change(architecture: Architecture, host: Host) -> TransactionReport:

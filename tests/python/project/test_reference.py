@@ -20,12 +20,13 @@ from mauve_rt._kernel import ERROR_REPLIES, condition_kinds, given_resource_kind
 from mauve_rt.cli.main import build_parser
 from mauve_rt.cli.verb import EXIT_STATUSES
 from mauve_rt.control.requests import Code
-from mauve_rt.model.kinds import Kind, ListOf, TableOf, Text
+from mauve_rt.file_schema.kinds import Kind, ListOf, TableOf, Text
+from mauve_rt.file_schema.section import Part, Section, setting
 from mauve_rt.model.plugins import KINDS
 from mauve_rt.model.schema import FileModel
-from mauve_rt.model.section import Part, Section, setting
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Change, StepForm
+from mauve_rt.modelling.schema import ModelFile
 from mauve_rt.node.executor.settings import help_text as executor_help
 from mauve_rt.node.supervisor.settings import help_text as supervisor_help
 from mauve_rt.supervision.rules import Rules
@@ -121,6 +122,7 @@ def test_the_stub_has_the_tables_of_the_kernel() -> None:
     ("part", "file"),
     [
         ("architecture_file", FileModel),
+        ("model_file", ModelFile),
         ("rules_file", Rules),
         ("script_file", Script),
         ("steps_file", Change),

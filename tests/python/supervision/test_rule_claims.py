@@ -2,7 +2,7 @@
 
 import pytest
 
-from mauve_rt.model.kinds import Faults
+from mauve_rt.file_schema.kinds import Faults
 from mauve_rt.supervision.rule_logic import can_meet, clash_in
 from mauve_rt.supervision.when import When, WhenPart
 from mauve_rt.yaml.text import read_yaml

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from mauve_rt._kernel import ConditionParameter
-from mauve_rt.model.kinds import Faults
+from mauve_rt.file_schema.kinds import Faults
 from mauve_rt.supervision.condition_table import choices, conditions
 from mauve_rt.supervision.when import When, WhenPart
 from mauve_rt.supervision.when_spec import refusal

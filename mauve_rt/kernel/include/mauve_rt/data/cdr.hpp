@@ -109,8 +109,12 @@ class CdrWriter {
   }
   void append(const void* data, std::size_t size) {
     const auto* bytes = static_cast<const std::byte*>(data);
+    if (size > sizeof(std::uint64_t)) {
+      buffer_.insert(buffer_.end(), bytes, bytes + size);
+      return;
+    }
     const std::size_t begin = buffer_.size();
-    buffer_.resize(begin + size);  // GCC 12 takes an insert() for a write out of bounds
+    buffer_.resize(begin + size);  // GCC 12 takes an insert() of one number for a write out of bounds
     std::copy_n(bytes, size, buffer_.data() + begin);
   }
 

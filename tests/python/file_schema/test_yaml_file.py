@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from mauve_rt.errors import ArchitectureFileError, internal_error_text
-from mauve_rt.model import yaml_file
-from mauve_rt.model.yaml_file import YamlFile
+from mauve_rt.file_schema import yaml_file
+from mauve_rt.file_schema.yaml_file import YamlFile
 
 
 @pytest.fixture

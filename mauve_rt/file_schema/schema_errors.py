@@ -1,15 +1,15 @@
-"""What is wrong with the form of an architecture file, in words."""
+"""What is wrong with the form of a file, in words."""
 
 from collections.abc import Mapping
 from typing import TypeVar
 
 from mauve_rt.errors import ArchitectureFileError, Problem
-from mauve_rt.model.kinds import Fault, Faults
-from mauve_rt.model.schema import FileModel
-from mauve_rt.model.words import did_you_mean, listed, shown
-from mauve_rt.model.yaml_file import Location, YamlFile
+from mauve_rt.file_schema.kinds import Fault, Faults
+from mauve_rt.file_schema.section import Section
+from mauve_rt.file_schema.words import did_you_mean, listed, shown
+from mauve_rt.file_schema.yaml_file import Location, YamlFile
 
-_Read = TypeVar("_Read", bound=FileModel)
+_Read = TypeVar("_Read", bound=Section)
 
 _EXPECTED: Mapping[str, str] = {
     "flag": "true or false",
@@ -27,8 +27,19 @@ _EXPECTED: Mapping[str, str] = {
 }
 
 
-def read_content(model: type[_Read], file: YamlFile) -> _Read:
-    """The content of a file.
+_NAMED: Mapping[str, str] = {
+    "components": "component",
+    "resources": "resource",
+    "types": "type",
+    "shells": "shell",
+    "cores": "core",
+    "fsms": "fsm",
+}
+"""Sections of files whose entries have names, and what an entry is."""
+
+
+def read_content(model: type[_Read], file: YamlFile, *, what: str = "an architecture file") -> _Read:
+    """The content of a file, which should be `what`.
 
     Raises:
         ArchitectureFileError: it breaks the schema, with every problem.
@@ -36,8 +47,8 @@ def read_content(model: type[_Read], file: YamlFile) -> _Read:
     faults: Faults = []
     if not isinstance(file.data, dict):
         found = "an empty file" if file.data is None else shown(file.data)
-        keys = listed(FileModel.settings, last="and")
-        raise file.error("not an architecture file", expected=f"the keys {keys}", found=found)
+        keys = listed(model.settings, last="and")
+        raise file.error(f"not {what}", expected=f"the keys {keys}", found=found)
     content = model.read(file.data, (), faults)
     if faults:
         raise ArchitectureFileError(file.path, [fault_problem(file, fault) for fault in faults])
@@ -69,7 +80,8 @@ def fault_problem(file: YamlFile, fault: Fault) -> Problem:
         return file.problem(location, what, expected=fault.limit, **facts)
     if fault.what == "missing":
         what = f"{_subject(location)} has no '{fault.limit}'"
-        remedy = "write `mauve: 1` at its top" if fault.limit == "mauve" else "add it"
+        is_version = fault.limit.startswith("mauve")
+        remedy = f"write `{fault.limit}: 1` at its top" if is_version else "add it"
         return file.problem(location, what, remedy=remedy, **facts)
     if fault.what == "name":
         what = f"bad name '{name}'{within}"
@@ -97,12 +109,12 @@ def _words(location: Location) -> str:
             return ""
         case ("connections", int(index), *_):
             return f" of connection {index + 1}"
-        case ("components" | "resources" as section, name):
-            return f" of {section[:-1]} '{name}'"
+        case (str(section), name) if section in _NAMED:
+            return f" of {_NAMED[section]} '{name}'"
         case (*before, int(index)):
             return f" {index + 1}{_words(tuple(before))}"
-        case ("components" | "resources" as section, name, *rest):
-            return f" in {'.'.join(str(part) for part in rest)} of {section[:-1]} '{name}'"
+        case (str(section), name, *rest) if section in _NAMED:
+            return f" in {'.'.join(str(part) for part in rest)} of {_NAMED[section]} '{name}'"
         case _:
             return f" in '{'.'.join(str(part) for part in location)}'"
 
@@ -113,8 +125,8 @@ def _subject(location: Location) -> str:
             return "the file"
         case ("connections", int(index), *_):
             return f"connection {index + 1}"
-        case ("components" | "resources" as section, name):
-            return f"{section[:-1]} '{name}'"
+        case (str(section), name) if section in _NAMED:
+            return f"{_NAMED[section]} '{name}'"
         case (*before, key, int(index)):
             return f"element {index + 1} of {key}{_words(tuple(before))}"
         case _:

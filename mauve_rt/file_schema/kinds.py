@@ -11,8 +11,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
-from mauve_rt.model.words import listed
-from mauve_rt.model.yaml_file import Location
+from mauve_rt.file_schema.words import listed
+from mauve_rt.file_schema.yaml_file import Location
 
 
 class Fault:

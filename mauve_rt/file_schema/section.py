@@ -12,8 +12,8 @@ Objects are immutable and compare by value. A setting whose default is None take
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
-from mauve_rt.model.kinds import Fault, Faults, Kind
-from mauve_rt.model.yaml_file import Location
+from mauve_rt.file_schema.kinds import Fault, Faults, Kind
+from mauve_rt.file_schema.yaml_file import Location
 
 _REQUIRED = object()
 

@@ -1,0 +1,22 @@
+"""Words that are no names in C++ or in Python."""
+
+import keyword
+
+_CPP = frozenset(
+    """
+    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
+    char32_t class co_await co_return co_yield compl concept const const_cast consteval constexpr
+    constinit continue decltype default delete do double dynamic_cast else enum explicit export extern
+    false float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr
+    operator or or_eq private protected public register reinterpret_cast requires return short signed
+    sizeof static static_assert static_cast struct switch template this thread_local throw true try
+    typedef typeid typename union unsigned using virtual void volatile wchar_t while xor xor_eq
+    """.split()  # noqa: SIM905 - a list would have a line for each
+)
+
+
+def language_of_keyword(name: str) -> str:
+    """The language, C++ or Python, in which a word is no name; empty: in neither."""
+    if name in _CPP:
+        return "C++"
+    return "Python" if keyword.iskeyword(name) else ""

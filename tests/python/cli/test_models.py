@@ -1,0 +1,131 @@
+"""The commands of models: check, analyze, generate and model, before any algorithm exists."""
+
+import json
+from pathlib import Path
+
+import pytest
+from page_blocks import blocks
+
+from mauve_rt.cli.main import main
+from mauve_rt.modelling.package_model import load_model
+
+ROOT = Path(__file__).parents[3]
+GUIDANCE = ROOT / "tests/python/modelling/guidance.yaml"
+ROBOT = """\
+mauve: 1
+components:
+  guidance:
+    shell: my_robot/GuidanceShell
+    core: my_robot/{core}
+    fsm: my_robot/GuidanceFsm
+    alternatives: [my_robot/StraightGuidance]
+    priority: 60
+    cpus: [0]
+    properties: {{unit_ms: {unit_ms}}}
+resources:
+  position: {{kind: shared_data, type: my_robot/msg/Point2D, topic: {{name: position, direction: subscribe}}}}
+  goal: {{kind: shared_data, type: my_robot/msg/Point2D}}
+  target: {{kind: shared_data, type: my_robot/msg/Point2D}}
+connections:
+  - [guidance.position, position.read]
+  - [guidance.goal, goal.read]
+  - [guidance.target, target.write]
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Path:
+    """The paper's Guidance; all its guards have a worst case."""
+    path = tmp_path / "model.yaml"
+    text = GUIDANCE.read_text(encoding="utf-8")
+    straight = "follow_path: 0.2 ms}}"
+    assert straight in text
+    path.write_text(text.replace(straight, "follow_path: 0.2 ms, has_new_goal: 1 us, has_path: 1 us}}"))
+    return path
+
+
+def robot(folder: Path, *, core: str = "PlannedGuidance", unit_ms: int = 10) -> str:
+    path = folder / "robot.yaml"
+    path.write_text(ROBOT.format(core=core, unit_ms=unit_ms), encoding="utf-8")
+    return str(path)
+
+
+def test_the_page_shows_the_model_of_the_tests() -> None:
+    page = (ROOT / "docs/howto/start_from_a_model.md").read_text(encoding="utf-8")
+    [shown] = [block.text for block in blocks(page) if block.language == "yaml"]
+    whole = GUIDANCE.read_text(encoding="utf-8").partition("\n")[2]
+    assert shown.strip() == whole.partition("  GuidancePsm:")[0].strip()
+
+
+def test_a_model_alone_is_checked(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(model)]) == 0
+    assert capfd.readouterr().out == f"{model}: 1 shell, 1 core, 2 fsms: no error found\n"
+    model.write_text(model.read_text().replace("next: W5", "next: W6"))
+    assert main(["check", str(model)]) == 2
+    assert capfd.readouterr().err.startswith(f"{model}:32:44: there is no state 'W6'; known: Following")
+
+
+def test_an_architecture_is_checked_with_a_model(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    path = robot(model.parent)
+    assert main(["check", path]) == 2
+    assert "package 'my_robot' is not found" in capfd.readouterr().err
+    assert main(["check", path, str(model)]) == 0
+    assert "1 component, 3 resources, 3 connections: no error found" in capfd.readouterr().out
+    Path(path).write_text(Path(path).read_text().replace("guidance.goal", "guidance.gaol"))
+    assert main(["check", path, str(model)]) == 2
+    assert "component 'guidance' has no port 'gaol'; did you mean goal?" in capfd.readouterr().err
+
+
+def verdict(path: str, model: Path, capfd: pytest.CaptureFixture[str]) -> tuple[int, dict]:  # type: ignore[type-arg]
+    status = main(["analyze", path, "--model", str(model), "--json"])
+    return status, json.loads(capfd.readouterr().out)
+
+
+def test_a_model_alone_is_proved_schedulable(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Planning and what is asked before it take 5.204 ms; it is released every 50 ms."""
+    status, told = verdict(robot(model.parent), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
+    [guidance] = told["components"]
+    times = {state["name"]: state["time_ns"] for state in guidance["states"]}
+    assert times == {"Idle": 202_000, "Planning": 5_000_000, "Following": 200_000}
+    assert guidance["states"][0]["origin"] == "declared by core my_robot/PlannedGuidance"
+
+    status, told = verdict(robot(model.parent, core="StraightGuidance"), model, capfd)
+    assert [state["time_ns"] for state in told["components"][0]["states"]] == [202_000, 300_000, 200_000]
+
+    status, told = verdict(robot(model.parent, unit_ms=1), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (1, "not schedulable")
+
+
+def test_a_missing_worst_case_is_not_provable(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    model.write_text(model.read_text().replace("compute_path: 5 ms, ", ""))
+    status, told = verdict(robot(model.parent), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (3, "not provable")
+
+
+def test_code_is_generated(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    assert main(["generate", str(model)]) == 0
+    told = capfd.readouterr().out.splitlines()
+    assert told[0] == f"{model.parent}/build/generated: 8 files generated"
+    assert told[1] == f"{model.parent}/src/planned_guidance.hpp: written, yours from now on"
+    assert main(["generate", str(model)]) == 0
+    assert len(capfd.readouterr().out.splitlines()) == 1
+    model.write_text(model.read_text().replace("next: W5", "next: W6"))
+    assert main(["generate", str(model)]) == 2
+    assert "there is no state 'W6'" in capfd.readouterr().err
+
+
+def test_an_installed_package_is_read_as_a_model(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """Generated parts of the mission, and hand-written ones of the tutorials."""
+    assert main(["model", "mauve_examples"]) == 0
+    told = capfd.readouterr()
+    assert "type Scan: its struct and its header are guesses" in told.err
+    path = tmp_path / "model.yaml"
+    path.write_text(told.out, encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    content, mission = load_model(path).content, load_model(ROOT / "mauve_examples/model.yaml").content
+    fsms = {name: fsm.changed(description="") for name, fsm in mission.fsms.items()}
+    assert content.fsms | fsms == content.fsms
+    assert content.cores["Metronome"].actions == ["tick", "beat"]
+    assert main(["model", "no_robot"]) == 2
+    assert "'no_robot'" in capfd.readouterr().err
