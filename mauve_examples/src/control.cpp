@@ -5,13 +5,13 @@
 
 namespace mauve_examples {
 
-bool ControlCore::configure_hook() {
+bool Control::configure_hook() {
   controller_.reset();
   scan_ = std::make_unique<Scan>();
   return true;
 }
 
-void ControlCore::control() {
+void Control::control() {
   ControlOptions options;
   options.max_speed_mps = shell().max_speed;
   options.heading.proportional = shell().heading_gain;
@@ -26,14 +26,6 @@ void ControlCore::control() {
   shell().scan.read(*scan_);
   const Twist wanted = controller_.step(pose.value, target.value, static_cast<double>(period_ns()) * 1e-9);
   shell().command.write(keep_apart(wanted, *scan_, ApartOptions{}));
-}
-
-void ControlFsm::define() {
-  mauve::State& control = execution("Control", "control", &ControlCore::control);
-  mauve::State& pause = wait("Pause", mauve::ms_to_ns(20));
-  set_initial(control);
-  next(control, pause);
-  next(pause, control);
 }
 
 }  // namespace mauve_examples

@@ -20,7 +20,7 @@ std::vector<std::string> split_names(const std::string& joined) {
 
 }  // namespace
 
-bool ExplorationCoreBase::configure_hook() {
+bool ExplorationBase::configure_hook() {
   const GridMap world = load_map(shell().map.value());
   const std::vector<std::string> peers = split_names(shell().peers);
   if (peers.size() > kMaxPeers) {
@@ -36,48 +36,36 @@ bool ExplorationCoreBase::configure_hook() {
   return true;
 }
 
-void ExplorationCoreBase::cleanup_hook() {
+void ExplorationBase::cleanup_hook() {
   explorer_.reset();
   message_.reset();
 }
 
-bool ExplorationCoreBase::adopt(const mauve::CoreBase& old) {
-  const auto* other = dynamic_cast<const ExplorationCoreBase*>(&old);
+bool ExplorationBase::adopt(const mauve::CoreBase& old) {
+  const auto* other = dynamic_cast<const ExplorationBase*>(&old);
   if (other == nullptr) return true;  // nothing of it can be understood: start afresh
   return other->explorer_->geometry() == explorer_->geometry() && other->robot_and_peers_ == robot_and_peers_;
 }
 
-void ExplorationCoreBase::take(mauve::CoreBase& old) noexcept {
-  auto* other = dynamic_cast<ExplorationCoreBase*>(&old);
+void ExplorationBase::take(mauve::CoreBase& old) noexcept {
+  auto* other = dynamic_cast<ExplorationBase*>(&old);
   if (other != nullptr) std::swap(explorer_, other->explorer_);
 }
 
-void ExplorationCoreBase::look() {
+void ExplorationBase::look() {
   while (shell().inbox.read(*message_) == mauve::DataStatus::new_data) explorer_->receive(*message_);
   shell().map_get([this](const OccupancyGrid& map) { explorer_->refresh(map); });
   explorer_->look(shell().pose.read().value, clock_ns());
 }
 
-void ExplorationCoreBase::decide() {
+void ExplorationBase::decide() {
   if (choose(*explorer_)) shell().goal.write(explorer_->destination());
   shell().done.write({explorer_->done()});
 }
 
-void ExplorationCoreBase::tell() {
+void ExplorationBase::tell() {
   explorer_->compose(*message_);
   shell().outbox.write(*message_);
-}
-
-void ExplorationFsm::define() {
-  mauve::State& look = execution("Look", "look", &ExplorationCoreBase::look);
-  mauve::State& decide = execution("Decide", "decide", &ExplorationCoreBase::decide);
-  mauve::State& tell = execution("Tell", "tell", &ExplorationCoreBase::tell);
-  mauve::State& pause = wait("Pause", mauve::ms_to_ns(500));
-  set_initial(look);
-  next(look, decide);
-  next(decide, tell);
-  next(tell, pause);
-  next(pause, look);
 }
 
 }  // namespace mauve_examples

@@ -6,7 +6,7 @@
 
 namespace mauve_examples {
 
-bool MappingCore::configure_hook() {
+bool Mapping::configure_hook() {
   const GridMap world = load_map(shell().map.value());
   shell().map_update([&world](OccupancyGrid& map) {
     // What was drawn before remains, unless it was of another world.
@@ -23,7 +23,7 @@ bool MappingCore::configure_hook() {
   return true;
 }
 
-bool MappingCore::read_scan_and_its_pose() {
+bool Mapping::read_scan_and_its_pose() {
   // Equal writer's times: the scan was taken at this pose, and not at the one before or after. On another CPU
   // than the robot's both are read at the very instant they are written, so a pair that does not match is
   // common: the next does.
@@ -38,7 +38,7 @@ bool MappingCore::read_scan_and_its_pose() {
   return false;
 }
 
-void MappingCore::integrate() {
+void Mapping::integrate() {
   const bool has_scan = read_scan_and_its_pose();
   shell().map_update([&](OccupancyGrid& map) {
     if (has_scan) integrate_scan(*scan_, pose_, map);
@@ -56,14 +56,6 @@ void MappingCore::integrate() {
   for (const MapTile& tile : update_->tiles) {  // no room for them: they are to be told yet
     changes_.forget(static_cast<std::size_t>(tile.row) * update_->columns + tile.column);
   }
-}
-
-void MappingFsm::define() {
-  mauve::State& integrate = execution("Integrate", "integrate", &MappingCore::integrate);
-  mauve::State& pause = wait("Pause", mauve::ms_to_ns(100));
-  set_initial(integrate);
-  next(integrate, pause);
-  next(pause, integrate);
 }
 
 }  // namespace mauve_examples

@@ -8,7 +8,7 @@
 
 namespace mauve_examples {
 
-bool RobotCore::configure_hook() {
+bool Robot::configure_hook() {
   world_ = load_map(shell().map.value());
   body_ = {.pose = {shell().start_x, shell().start_y, shell().start_yaw},
            .speed_mps = 0.0,
@@ -32,14 +32,14 @@ bool RobotCore::configure_hook() {
   return true;
 }
 
-Twist RobotCore::command_in_force() const {
+Twist Robot::command_in_force() const {
   const mauve::Sample<Twist> sample = shell().command.read();
   const auto timeout_ns = static_cast<mauve::time_ns_t>(shell().command_timeout * 1e9);
   return sample.status != mauve::DataStatus::none && sample.age_ns(clock_ns()) <= timeout_ns ? sample.value
                                                                                              : Twist{};
 }
 
-void RobotCore::move() {
+void Robot::move() {
   limits_.speed_mps = shell().max_speed;
   Unicycle next = body_;
   next.step(command_in_force(), limits_, static_cast<double>(period_ns()) * 1e-9);
@@ -52,7 +52,7 @@ void RobotCore::move() {
   body_ = next;
 }
 
-void RobotCore::meet_others() {
+void Robot::meet_others() {
   constexpr std::int64_t kStepsPerTelling = 5;  // 20 Hz
   const auto number = static_cast<std::uint8_t>(shell().number.value());
   RobotBody body;
@@ -69,7 +69,7 @@ void RobotCore::meet_others() {
     shell().body.write({number, body_.pose.x, body_.pose.y, shell().radius.value()});
 }
 
-void RobotCore::sense() {
+void Robot::sense() {
   meet_others();
   const auto range_m = static_cast<float>(shell().max_range.value());
   const bool as_before = walls_->max_range_m == range_m && seen_from_.x == body_.pose.x &&
@@ -83,22 +83,12 @@ void RobotCore::sense() {
   shell().scan.write(*scan_);
 }
 
-void RobotCore::take(mauve::CoreBase& old) noexcept {
-  if (const auto* robot = dynamic_cast<const RobotCore*>(&old)) {
+void Robot::take(mauve::CoreBase& old) noexcept {
+  if (const auto* robot = dynamic_cast<const Robot*>(&old)) {
     body_ = robot->body_;
     others_ = robot->others_;
     collisions_ = robot->collisions_;
   }
-}
-
-void RobotFsm::define() {
-  mauve::State& move = execution("Move", "move", &RobotCore::move);
-  mauve::State& sense = execution("Sense", "sense", &RobotCore::sense);
-  mauve::State& pause = wait("Pause", mauve::ms_to_ns(10));
-  set_initial(move);
-  next(move, sense);
-  next(sense, pause);
-  next(pause, move);
 }
 
 }  // namespace mauve_examples

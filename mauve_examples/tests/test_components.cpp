@@ -6,151 +6,13 @@
 #include <chrono>
 #include <thread>
 
-#include "mauve_examples/control.hpp"
-#include "mauve_examples/exploration.hpp"
-#include "mauve_examples/guidance.hpp"
-#include "mauve_examples/mapping.hpp"
-#include "mauve_examples/reachability.hpp"
-#include "mauve_examples/robot.hpp"
-#include "mauve_examples/start_poses.hpp"
+#include "robot_architecture.hpp"
 #include "test_maps.hpp"
 
 namespace mauve_examples::test_components {
 
-using mauve::RingBuffer;
-using mauve::SharedData;
 using namespace std::chrono_literals;
-
-/// Robots as in the project's architecture file, without ROS.
-class RobotArchitecture {
- public:
-  explicit RobotArchitecture(const std::string& map_name, const std::string& peers = "") {
-    const std::string map = testing::own_map(map_name).string();
-    world_ = load_map(map);
-    start_ = start_poses(world_, 1, 4)[0];
-    auto& robot = architecture_.add_component<RobotShell, RobotCore, RobotFsm>("robot", {.priority = 80});
-    auto& control =
-        architecture_.add_component<ControlShell, ControlCore, ControlFsm>("control", {.priority = 70});
-    auto& guidance =
-        architecture_.add_component<GuidanceShell, GuidanceCore, GuidanceFsm>("guidance", {.priority = 60});
-    auto& mapping =
-        architecture_.add_component<MappingShell, MappingCore, MappingFsm>("mapping", {.priority = 50});
-    auto& exploration = architecture_.add_component<ExplorationShell, ExplorationCore, ExplorationFsm>(
-        "exploration", {.priority = 40});
-    robot.set_property("start_x", start_.x);
-    robot.set_property("start_y", start_.y);
-    robot.set_property("start_yaw", start_.theta);
-    for (mauve::Component* component : {&robot, &guidance, &mapping, &exploration})
-      component->set_property("map", map);
-    exploration.set_property("peers", peers);
-
-    auto& pose = architecture_.add_resource<SharedData<Pose2D>>("pose");
-    auto& command = architecture_.add_resource<SharedData<Twist>>("command");
-    auto& scan = architecture_.add_resource<SharedData<Scan>>("scan");
-    auto& body = architecture_.add_resource<SharedData<RobotBody>>("body");
-    auto& bodies =
-        architecture_.add_resource<RingBuffer<RobotBody>>("bodies", 64U, mauve::WhenFull::overwrite);
-    auto& target = architecture_.add_resource<SharedData<Point>>("target");
-    auto& goal = architecture_.add_resource<SharedData<Point>>("goal");
-    auto& done = architecture_.add_resource<SharedData<Bool>>("done");
-    auto& own_map = architecture_.add_resource<OccupancyMap>("map");
-    auto& updates = architecture_.add_resource<RingBuffer<MapUpdate>>("map_updates", 8U);
-    auto& outbox =
-        architecture_.add_resource<RingBuffer<PeerMessage>>("outbox", 4U, mauve::WhenFull::overwrite);
-    auto& inbox =
-        architecture_.add_resource<RingBuffer<PeerMessage>>("inbox", 16U, mauve::WhenFull::overwrite);
-    const auto connect = [this](mauve::Component& component, const char* port, mauve::Resource& resource,
-                                const char* service) {
-      architecture_.connect(component, port, resource, service);
-    };
-    connect(robot, "command", command, "read");
-    connect(robot, "pose", pose, "write");
-    connect(robot, "scan", scan, "write");
-    connect(robot, "body", body, "write");
-    connect(robot, "bodies", bodies, "read");
-    connect(control, "scan", scan, "read");
-    connect(guidance, "scan", scan, "read");
-    connect(control, "pose", pose, "read");
-    connect(control, "target", target, "read");
-    connect(control, "command", command, "write");
-    connect(guidance, "pose", pose, "read");
-    connect(guidance, "goal", goal, "read");
-    connect(guidance, "target", target, "write");
-    connect(guidance, "map_get", own_map, "get");
-    connect(mapping, "pose", pose, "read");
-    connect(mapping, "scan", scan, "read");
-    connect(mapping, "map_update", own_map, "update");
-    connect(mapping, "map_updates", updates, "write");
-    connect(exploration, "pose", pose, "read");
-    connect(exploration, "map_get", own_map, "get");
-    connect(exploration, "inbox", inbox, "read");
-    connect(exploration, "outbox", outbox, "write");
-    connect(exploration, "goal", goal, "write");
-    connect(exploration, "done", done, "write");
-    map_ = &own_map;
-    done_ = &done;
-    goal_ = &goal;
-    pose_ = &pose;
-    command_ = &command;
-  }
-
-  mauve::Architecture& architecture() { return architecture_; }
-  const Pose2D& start() const { return start_; }
-  mauve::Component& component(const std::string& name) { return architecture_.component(name); }
-
-  double coverage() {
-    const std::vector<Pose2D> starts{start_};
-    const auto reachable = reachable_cells(world_, starts, 0.2);
-    double covered = 0.0;
-    double total = 0.0;
-    map_->get.call([&](const OccupancyGrid& map) {
-      for (std::size_t i = 0; i < reachable.size(); ++i) {
-        if (reachable[i] == 0) continue;
-        total += 1.0;
-        covered += map.cells()[i] == kFree ? 1.0 : 0.0;
-      }
-    });
-    return covered / total;
-  }
-  bool done() { return value(*done_).data; }
-  Pose2D pose() { return value(*pose_); }
-  void command(const Twist& twist, mauve::time_ns_t now_ns) { command_->write.write(twist, now_ns); }
-  std::uint64_t goals() {
-    Point goal;
-    mauve::time_ns_t time_ns = 0;
-    mauve::ReaderState reader;
-    goal_->read.read(goal, time_ns, reader);
-    return reader.seen;
-  }
-  bool wait_done(std::chrono::seconds timeout) {
-    const auto until = std::chrono::steady_clock::now() + timeout;
-    while (!done() && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(20ms);
-    return done();
-  }
-  void expect_no_faults() {
-    for (const auto& each : architecture_.components())
-      EXPECT_EQ(each->task().fault().what, "") << each->name();
-  }
-
- private:
-  template <typename T>
-  T value(SharedData<T>& resource) {
-    T value{};
-    mauve::time_ns_t time_ns = 0;
-    mauve::ReaderState reader;
-    resource.read.read(value, time_ns, reader);
-    return value;
-  }
-
-  GridMap world_;
-  Pose2D start_;
-  mauve::Architecture architecture_;
-  OccupancyMap* map_{nullptr};
-  SharedData<Bool>* done_{nullptr};
-  SharedData<Point>* goal_{nullptr};
-  SharedData<Pose2D>* pose_{nullptr};
-  SharedData<Twist>* command_{nullptr};
-};
+using testing::RobotArchitecture;
 
 TEST(Components, PeriodsAreThoseOfTheirMachines) {
   RobotArchitecture robot("room");
@@ -172,10 +34,10 @@ TEST(Components, OneRobotExploresARoomWhileItsCoresAreReplaced) {
   deployer.deploy();
   std::this_thread::sleep_for(2200ms);
   EXPECT_FALSE(robot.done());
-  const auto there = robot.component("exploration").swap_core(std::make_unique<LocalExplorationCore>());
+  const auto there = robot.component("exploration").swap_core(std::make_unique<LocalExploration>());
   EXPECT_EQ(there.missed_releases, 0);
   std::this_thread::sleep_for(1200ms);
-  const auto back = robot.component("exploration").swap_core(std::make_unique<ExplorationCore>());
+  const auto back = robot.component("exploration").swap_core(std::make_unique<Exploration>());
   EXPECT_EQ(back.missed_releases, 0);
   EXPECT_TRUE(robot.wait_done(60s));
   deployer.shutdown();
@@ -191,7 +53,7 @@ TEST(Components, WithASilentPeerExplorationWaitsAndLocalExplorationDoesNot) {
   std::this_thread::sleep_for(1700ms);
   EXPECT_EQ(robot.goals(), 0U);
   EXPECT_FALSE(robot.done());
-  robot.component("exploration").swap_core(std::make_unique<LocalExplorationCore>());
+  robot.component("exploration").swap_core(std::make_unique<LocalExploration>());
   const auto until = std::chrono::steady_clock::now() + 10s;
   while (robot.goals() == 0 && std::chrono::steady_clock::now() < until) std::this_thread::sleep_for(20ms);
   EXPECT_GT(robot.goals(), 0U);
@@ -210,9 +72,9 @@ TEST(Components, ReplacingTheRobotsOrTheMappingsCoreLosesNothing) {
     std::this_thread::sleep_for(20ms);
   }
   const double covered = robot.coverage();
-  robot.component("mapping").swap_core(std::make_unique<MappingCore>());
+  robot.component("mapping").swap_core(std::make_unique<Mapping>());
   EXPECT_GE(robot.coverage(), covered);
-  robot.component("robot").swap_core(std::make_unique<RobotCore>());
+  robot.component("robot").swap_core(std::make_unique<Robot>());
   EXPECT_GT(distance_m(robot.pose(), robot.start()), 2.0);
   deployer.shutdown();
   robot.expect_no_faults();

@@ -5,26 +5,16 @@
 #include <memory>
 
 #include "mauve_examples/changed_tiles.hpp"
+#include "mauve_examples/model/mapping_core.hpp"
 #include "mauve_examples/occupancy_map.hpp"
 #include "mauve_examples/types.hpp"
 
 namespace mauve_examples {
 
-struct MappingShell : mauve::Shell {
-  mauve::Property<std::string>& map = property(
-      "map", "", {.description = "YAML file: how large the world is", .structural = mauve::ReadBy::core});
-
-  mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
-  mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
-  mauve::CallPort<void(MapWriter)>& map_update = call_port<void(MapWriter)>("map_update", kMapWriterType);
-  mauve::WritePort<MapUpdate>& map_updates = write_port<MapUpdate>(
-      "map_updates", {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold});
-};
-
-class MappingCore : public mauve::Core<MappingShell> {
+class Mapping final : public MappingCore {
  public:
   /// Adds the newest scan to the map and tells what changed. [rt]
-  void integrate();
+  void integrate() override;
 
  protected:
   bool configure_hook() override;
@@ -36,10 +26,6 @@ class MappingCore : public mauve::Core<MappingShell> {
   std::unique_ptr<Scan> scan_;
   std::unique_ptr<MapUpdate> update_;
   ChangedTiles changes_;  // since they were last told
-};
-
-struct MappingFsm : mauve::Fsm<MappingShell, MappingCore> {
-  void define() override;
 };
 
 }  // namespace mauve_examples
