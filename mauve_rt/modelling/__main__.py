@@ -8,6 +8,7 @@ Writes the generated files, and prints a line for each thing that the build has 
 
 import argparse
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, MauveError
@@ -38,7 +39,7 @@ def main() -> int:
         return 2
     for warning in model.warnings:
         print(f"{model.path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
-    found: dict[str, list[str | Path]] = {
+    found: dict[str, Sequence[str | Path]] = {
         "message": messages(model),
         "interface": interfaces(model),
         "reads": [model.path, *_own_files()],
