@@ -9,7 +9,7 @@ from mauve_rt.errors import Problem
 from mauve_rt.file_schema.words import did_you_mean, listed
 from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.modelling.durations import NS_OF, Duration
-from mauve_rt.modelling.keywords import language_of_keyword
+from mauve_rt.modelling.keywords import languages_of_keyword
 from mauve_rt.modelling.schema import CoreModel, CppType, FsmModel, ModelFile, ShellModel, StateModel
 from mauve_rt.modelling.type_names import NUMBERS, TypeName
 
@@ -92,8 +92,8 @@ class _Checks:
             yield from ((("cores", name, "implementations", one), one) for one in core.implementations)
 
     def _keyword(self, place: Location, name: str) -> Iterator[Problem]:
-        if language := language_of_keyword(name):
-            what = f"'{name}' is a keyword of {language}"
+        if languages := languages_of_keyword(name):
+            what = f"'{name}' is a keyword of {languages[0]}"
             yield self._file.key_problem(
                 place, what, expected="a name in C++ and in Python", remedy="rename it"
             )
@@ -187,8 +187,8 @@ class _Checks:
 
     def _method(self, place: Location, kind: str, name: str, seen: dict[str, str]) -> Iterator[Problem]:
         point = self._file.key_problem if kind == "state" else self._file.problem
-        if language := language_of_keyword(name):
-            what = f"'{name}' is a keyword of {language}"
+        if languages := languages_of_keyword(name):
+            what = f"'{name}' is a keyword of {languages[0]}"
             yield point(place, what, expected="a name in C++ and in Python", remedy="rename it")
         elif name in _RESERVED:
             yield point(place, f"every core has a method '{name}'", remedy="rename it")

@@ -15,8 +15,7 @@ _CPP = frozenset(
 )
 
 
-def language_of_keyword(name: str) -> str:
-    """The language, C++ or Python, in which a word is no name; empty: in neither."""
-    if name in _CPP:
-        return "C++"
-    return "Python" if keyword.iskeyword(name) else ""
+def languages_of_keyword(name: str) -> list[str]:
+    """The languages, C++ and Python, in which a word is no name."""
+    is_one = {"C++": name in _CPP, "Python": keyword.iskeyword(name)}
+    return [language for language, found in is_one.items() if found]

@@ -7,7 +7,7 @@ from mauve_rt.modelling.checks import abstract_class
 from mauve_rt.modelling.cpp import snake
 from mauve_rt.modelling.durations import Duration
 from mauve_rt.modelling.package_model import PackageModel
-from mauve_rt.modelling.schema import CoreModel, CppCall, CppType, PortModel, PropertyModel
+from mauve_rt.modelling.schema import CoreModel, CppCall, PortModel, PropertyModel
 from mauve_rt.modelling.type_names import NUMBERS
 
 
@@ -108,7 +108,4 @@ def wcet(core: CoreModel) -> dict[str, dict[str, int]]:
 
 def own_types(model: PackageModel) -> list[str]:
     """By their registered names, the types that the model declares."""
-    return [
-        own.name if isinstance(own, CppType) else f"{model.package}/msg/{name}"
-        for name, own in model.content.types.items()
-    ]
+    return [model.registered_type(name) for name in model.content.types]

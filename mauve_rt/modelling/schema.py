@@ -21,7 +21,7 @@
           Following: {run: follow_path, next: W1}
           W1: {wait: 1 * unit_ms, next: Idle}
 
-Whether the names in it fit each other is told by `mauve_rt.modelling.checks`.
+`mauve_rt.modelling.checks` says whether the names in it fit each other.
 """
 
 from collections.abc import Mapping

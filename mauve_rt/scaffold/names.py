@@ -1,22 +1,13 @@
 """Names of new packages and parts, checked before anything is written."""
 
-import keyword
 import re
 
 from mauve_rt.errors import ParameterError
+from mauve_rt.modelling.cpp import snake
+from mauve_rt.modelling.keywords import languages_of_keyword
 
 _PACKAGE = re.compile(r"[a-z](?:_?[a-z0-9])+")
 _PART = re.compile(r"[A-Za-z](?:_?[A-Za-z0-9])*")
-_KEYWORDS_OF_CPP = """
-alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t
-class co_await co_return co_yield compl concept const const_cast consteval constexpr constinit continue
-decltype default delete do double dynamic_cast else enum explicit export extern false float for friend
-goto if inline int long mutable namespace new noexcept not not_eq nullptr operator or or_eq private
-protected public register reinterpret_cast requires return short signed sizeof static static_assert
-static_cast struct switch template this thread_local throw true try typedef typeid typename union
-unsigned using virtual void volatile wchar_t while xor xor_eq
-"""
-_CPP = frozenset(_KEYWORDS_OF_CPP.split())
 # A package is a C++ namespace, a Python module and a CMake project: names that one of these has already.
 _TAKEN = frozenset({"all", "clean", "help", "install", "mauve", "package", "std", "test"})
 
@@ -54,18 +45,14 @@ def part_names(name: str) -> tuple[str, str]:
             "Choose a name such as LiftArm."
         )
     class_name = "".join(word[0].upper() + word[1:] for word in name.split("_"))
-    file = re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", class_name).lower()
+    file = snake(class_name)
     for each in (class_name, file):
         _check_keyword(each, "name")
     return class_name, file
 
 
 def _check_keyword(name: str, what: str) -> None:
-    languages = [
-        language
-        for language, is_one in (("C++", name in _CPP), ("Python", keyword.iskeyword(name)))
-        if is_one
-    ]
+    languages = languages_of_keyword(name)
     if languages:
         raise ParameterError(
             f"{what}: '{name}' is a keyword of {' and '.join(languages)}. Choose another name."
