@@ -1,19 +1,19 @@
 """Bounds of the response times of an architecture's components, as far as all that delays them is known."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Self
 
 from mauve_rt.analysis.digraph import DigraphTask, digraph_of, period_of
-from mauve_rt.analysis.digraph_times import Component, DigraphTimes, digraph_times
-from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime, digraph_times
+from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 from mauve_rt.analysis.obstacles import obstacles
 from mauve_rt.analysis.task import CriticalSection
 
 
 @dataclass(frozen=True)
 class Subject:
-    """A component under analysis."""
+    """A component under analysis, or another thread."""
 
     machine: Machine
     task: DigraphTask
@@ -21,12 +21,13 @@ class Subject:
     """What keeps it from being proved."""
 
     @classmethod
-    def of(cls, machine: Machine, others: Sequence[Machine] = ()) -> Self:
+    def of(cls, machine: Machine, others: Sequence[Machine] = (), *, overhead_ns: int = 0) -> Self:
         """With its jobs, its period where it does not run yet, and what is missing.
 
-        `others`: components of the same architecture; the component may be among them.
+        `others`: components and threads of the same architecture; the component may be among them.
+        `overhead_ns`: what a release costs beside the states, on this computer.
         """
-        task = digraph_of(machine)
+        task = digraph_of(machine, overhead_ns=overhead_ns)
         if not machine.period_ns and not any(state.is_event_wait for state in machine.states):
             machine = replace(machine, period_ns=period_of(task))
         return cls(machine, task, tuple(obstacles(machine, others)))
@@ -38,8 +39,8 @@ class Subject:
 
     @property
     def sections(self) -> tuple[CriticalSection, ...]:
-        """Of a job: no lock is held for longer than a job takes."""
-        longest_ns = max(self.task.largest_cost_ns or 0, 1)
+        """Of a job: a component holds no lock for longer than a job takes."""
+        longest_ns = max(self.task.largest_cost_ns or 0, 1) if self.machine.is_component else FOREVER_NS
         return tuple(
             CriticalSection(resource=hold.resource, length_ns=min(hold.longest_ns, longest_ns))
             for hold in self.machine.holds
@@ -48,48 +49,72 @@ class Subject:
 
 @dataclass(frozen=True)
 class Bound:
-    """Of the job of a component that comes closest to its deadline."""
+    """Of the jobs of a component."""
 
     response_ns: int | None
-    """From its instant to the next wait at the latest; None: nothing is known."""
+    """The longest: from an instant to the next wait; None: nothing is known."""
     deadline_ns: int
+    """Of that job; of the first late one, where one is late."""
     reason: str = ""
     """Why there is no bound."""
     blocking_ns: int = 0
     """The part of it in which components of lower priority hold locks."""
+    jobs: tuple[JobTime, ...] = field(default=(), compare=False)
+    walls_ns: Mapping[str, int] = field(default_factory=dict, compare=False)
+    """Of each execution state the longest time from its begin to its end."""
+    too_long: tuple[str, ...] = ()
+    """What may last beyond its wall-clock bound, in words."""
 
     @property
     def meets_deadline(self) -> bool:
-        """Whether each job comes to its wait in time, as far as the assumptions hold."""
-        return self.response_ns is not None and self.response_ns <= self.deadline_ns
+        """Whether each job comes to its wait in time and no state is cut off, if the assumptions hold."""
+        in_time = self.response_ns is not None and self.response_ns <= self.deadline_ns
+        return in_time and not self.too_long
 
 
 def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, Bound]:
     """The bound of each component.
 
-    `wakeup_ns`: how long after its instant a thread begins at the latest, on this machine.
+    `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
     """
     times: dict[str, DigraphTimes] = {}
     for here in by_cpu(subjects):
-        components = [Component(subject.task, subject.machine.priority, subject.sections) for subject in here]
-        times |= digraph_times(components, jitter_ns=wakeup_ns)
-    return {subject.name: _bound(subject, subjects, times) for subject in subjects}
+        found = digraph_times([_component(subject) for subject in here], jitter_ns=wakeup_ns)
+        times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
+    return {
+        subject.name: _bound(subject, subjects, times) for subject in subjects if subject.machine.is_component
+    }
+
+
+def _component(subject: Subject) -> Component:
+    machine = subject.machine
+    states = tuple((state.name, state.time.ns or 0) for state in machine.states if not state.is_wait)
+    return Component(subject.task, machine.priority, subject.sections, bool(machine.clients), states)
 
 
 def by_cpu(subjects: Sequence[Subject]) -> list[list[Subject]]:
-    """Those without obstacles, each of which runs on one CPU."""
+    """Those without obstacles: components of each CPU, and threads that may run there."""
     known = [subject for subject in subjects if not subject.obstacles]
-    cpus = sorted({subject.machine.cpus for subject in known})
-    return [[subject for subject in known if subject.machine.cpus == each] for each in cpus]
+    cpus = sorted({subject.machine.cpus for subject in known if subject.machine.is_component})
+    return [[subject for subject in known if _runs_on(subject.machine, each)] for each in cpus]
+
+
+def _runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
+    if machine.is_component:
+        return machine.cpus == cpus
+    return not machine.cpus or bool({*machine.cpus} & {*cpus})
+
+
+def delaying(subject: Subject, subjects: Sequence[Subject]) -> list[Subject]:
+    """Those that may delay it and of which something is missing."""
+    return [other for other in subjects if other.obstacles and _may_delay(other, subject, among=subjects)]
 
 
 def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]) -> Bound:
     deadline_ns = min((job.deadline_ns for job in subject.task.jobs), default=0)
     if subject.obstacles:
         return Bound(None, deadline_ns, "it is not provable")
-    unknown = [
-        other.name for other in subjects if other.obstacles and _may_delay(other, subject, among=subjects)
-    ]
+    unknown = [other.name for other in delaying(subject, subjects)]
     if unknown:
         return Bound(None, deadline_ns, f"{', '.join(unknown)} may delay it, and nothing is proved of that")
     found = times[subject.name]
@@ -98,16 +123,36 @@ def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, Di
         return Bound(None, deadline_ns, f"after each wait for a service ({names}) a lock may block it anew")
     if found.reason:
         return Bound(None, deadline_ns, found.reason, found.blocking_ns)
-    closest = min(found.jobs, key=lambda one: one.job.deadline_ns - one.response_ns, default=None)
-    if closest is None:
+    if not found.jobs:
         return Bound(0, 0)
-    return Bound(closest.response_ns, closest.job.deadline_ns, blocking_ns=found.blocking_ns)
+    late = [one for one in found.jobs if one.response_ns > one.job.deadline_ns]
+    shown = max(late or found.jobs, key=lambda one: (one.response_ns, -one.job.deadline_ns))
+    return Bound(
+        shown.response_ns,
+        shown.job.deadline_ns,
+        blocking_ns=found.blocking_ns,
+        jobs=found.jobs,
+        walls_ns=found.walls_ns,
+        too_long=tuple(_too_long(subject.machine, found.walls_ns)),
+    )
+
+
+def _too_long(machine: Machine, walls_ns: Mapping[str, int]) -> Iterator[str]:
+    for state in machine.states:
+        wall_ns = walls_ns.get(state.name, 0)
+        if state.limit_ns and wall_ns > state.limit_ns:
+            yield (
+                f"{state.name} may last {in_ms(wall_ns)}, preemption and blocking included, and its "
+                f"max_execution_ns is {in_ms(state.limit_ns)}"
+            )
 
 
 def _may_delay(other: Subject, subject: Subject, *, among: Sequence[Subject]) -> bool:
     """Whether it may run on the subject's CPU, with a priority of its own or an inherited one."""
+    if other is subject:
+        return False
     cpus = {*other.machine.cpus}
     meet = not cpus or bool(cpus & {*subject.machine.cpus})
-    sharing = (each.machine for each in among if each.machine.resources & other.machine.resources)
+    sharing = (each.machine for each in among if each.machine.locks & other.machine.locks)
     highest = max(other.machine.priority, *(machine.priority for machine in sharing), 0)
     return meet and highest >= subject.machine.priority

@@ -35,6 +35,8 @@ class Job:
     """The least time from its release to the next one; FOREVER_NS: none follows."""
     deadline_ns: int
     """From its release, to have come to its wait."""
+    release_cost_ns: int | None = 0
+    """The part of `cost_ns` before the first state: the wake-up, and the guards of the wait."""
 
 
 @dataclass(frozen=True)
@@ -78,13 +80,13 @@ def period_of(task: DigraphTask) -> int:
     return period
 
 
-def digraph_of(machine: Machine) -> DigraphTask:
-    """The jobs of a machine that its initial state leads to."""
+def digraph_of(machine: Machine, *, overhead_ns: int = 0) -> DigraphTask:
+    """The jobs of a machine that its initial state leads to; each release costs `overhead_ns`."""
     states = {state.name: state for state in machine.states}
     initial = next((state for state in machine.states if state.is_initial), None)
     if initial is None:
         return DigraphTask(machine.name, ())
-    ways = _Ways(states)
+    ways = _Ways(states, overhead_ns)
     jobs: list[Job] = []
     waits = [initial.name] if initial.is_wait else [*ways.to_waits(initial.name)]
     if not initial.is_wait:
@@ -99,15 +101,20 @@ def digraph_of(machine: Machine) -> DigraphTask:
 class _Ways:
     """The ways through execution states: they have no loop without a wait, which the kernel refuses."""
 
-    def __init__(self, states: dict[str, State]) -> None:
+    def __init__(self, states: dict[str, State], overhead_ns: int) -> None:
         self._states = states
+        self._overhead_ns = overhead_ns
         self.to_waits = cache(self._to_waits)
 
     def jobs(self, after: str, first: str, deadline_ns: int) -> Iterator[Job]:
         """One for each wait that the state leads to."""
+        guards_ns = self._states[after].time.ns if after else 0
+        release_ns = None if guards_ns is None else guards_ns + self._overhead_ns
         for until, (cost_ns, way) in self.to_waits(first).items():
             separation_ns = self._states[until].separation_ns
-            yield Job(after, way, cost_ns, until, separation_ns, deadline_ns or separation_ns)
+            whole_ns = None if cost_ns is None or release_ns is None else cost_ns + release_ns
+            deadline = deadline_ns or separation_ns
+            yield Job(after, way, whole_ns, until, separation_ns, deadline, release_ns)
 
     def _to_waits(self, name: str) -> dict[str, tuple[int | None, tuple[str, ...]]]:
         """The costliest way from a state to each wait: its cost, and the states on it."""

@@ -6,15 +6,17 @@ the most that it can ask for counts, which may be of one path at one instant and
 sound, and more than one run can show.
 
 Components share resources, whose mutexes inherit priorities: `blocking` bounds how long components of lower
-priority run in a busy window. A thread that waits for a lock leaves the kernel's queue, so for a component
-that shares a resource all others of its priority count as higher, as in `fixed_priority`.
+priority run in a busy window. A thread that waits for a lock or for a ROS service leaves the kernel's queue,
+so for a component that does so all others of its priority count as higher.
+
+An execution state is bounded as well, from its begin to its end: by the same demands.
 
 Source: Stigge, Yi, "Combinatorial Abstraction Refinement for Feasibility Analysis of Static Priorities",
 Real-Time Systems 51, 2015: its abstract test and its exact one, without the refinement between the two.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fractions import Fraction
 from itertools import product, takewhile
 
@@ -35,6 +37,10 @@ class Component:
     priority: int
     sections: tuple[CriticalSection, ...] = ()
     """Of any of its jobs."""
+    waits_for_services: bool = False
+    """Its jobs wait for ROS services: these waits are in their costs."""
+    states: tuple[tuple[str, int], ...] = ()
+    """Name and cost of those to bound each by itself."""
 
     @property
     def name(self) -> str:
@@ -59,6 +65,8 @@ class DigraphTimes:
     """Why there are none."""
     blocking_ns: int = 0
     """For how long components of lower priority run in a busy window, as far as they hold locks."""
+    walls_ns: Mapping[str, int] = field(default_factory=dict)
+    """Of each state the longest time from its begin to its end; none where there is no bound."""
 
     @property
     def response_ns(self) -> int | None:
@@ -87,12 +95,13 @@ def _times(
 ) -> DigraphTimes:
     higher = [other.name for other in components if other.priority > one.priority]
     equal = [other.name for other in components if other.priority == one.priority and other is not one]
-    if shares_a_resource(one, components):
+    if one.waits_for_services or shares_a_resource(one, components):
         higher, equal = [*higher, *equal], []
     load = sum((loads[name] for name in (*higher, *equal, one.name)), start=Fraction(0))
     blocked_ns = blocking_ns(one, components)
-    if load >= 1:
-        reason = f"the utilization at this priority is {float(load):.4g}: nothing is left"
+    if load > 1 or (load == 1 and (blocked_ns or jitter_ns)):
+        more = "" if load > 1 else ", and blocking or late wake-ups come on top"
+        reason = f"the utilization at this priority is {float(load):.4g}{more}: nothing is left"
         return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
     try:
         level = _Level(
@@ -107,9 +116,11 @@ def _times(
             arrival_ns = path.release_ns - jitter_ns
             response_ns = level.finish_ns(path) - arrival_ns
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
+        walls_ns = {name: level.wall_ns(cost_ns) for name, cost_ns in one.states}
     except UnboundedError as reason:
         return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
-    return DigraphTimes(tuple(JobTime(job, longest[job]) for job in one.task.jobs), blocking_ns=blocked_ns)
+    jobs = tuple(JobTime(job, longest[job]) for job in one.task.jobs)
+    return DigraphTimes(jobs, blocking_ns=blocked_ns, walls_ns=walls_ns)
 
 
 def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:
@@ -128,12 +139,23 @@ class _Level:
             lambda length_ns: blocking_ns + sum(one.in_ns(length_ns) for one in everything), 1
         )
         """The longest busy window: the least L > 0 with blocking + the demand of all in [0, L) <= L."""
+        self._higher, self._blocking_ns = tuple(higher), blocking_ns
         each = _of_each_path((*higher, *equal), self.window_ns)
         self._delays = [_Delay(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
 
     def finish_ns(self, path: Path) -> int:
         """When the last job of a path is done at the latest, from the window's start on."""
         return max(delay.finish_ns(path) for delay in self._delays)
+
+    def wall_ns(self, cost_ns: int) -> int:
+        """How long an execution can last: the least w with cost + blocking + the higher demand in w <= w.
+
+        It has begun, so no component of equal priority goes first.
+        """
+        fixed_ns = self._blocking_ns + cost_ns
+        return least_time_ns(
+            lambda time_ns: fixed_ns + sum(one.in_ns(time_ns) for one in self._higher), fixed_ns
+        )
 
 
 def _of_each_path(demands: Sequence[Demand], until_ns: int) -> list[tuple[Staircase, ...]]:

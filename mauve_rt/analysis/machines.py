@@ -1,6 +1,6 @@
 """A component as the analysis takes it: its machine of states, and how its thread is scheduled."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Self
 
@@ -16,6 +16,8 @@ class ExecutionTime:
     origin: str = "missing"
     why_missing: str = ""
     """Empty: nothing declares a part of it."""
+    is_measured: bool = False
+    """Whether it is the longest of a recording: a longer one may come."""
 
     def __str__(self) -> str:
         """As `0.200 ms, declared`."""
@@ -36,7 +38,9 @@ class State:
     is_event_wait: bool
     successors: tuple[str, ...]
     time: ExecutionTime = ExecutionTime()
-    """Of an execution state."""
+    """Of an execution state; of a wait that of all guards that are asked at its end."""
+    limit_ns: int = 0
+    """Of an execution state: its wall-clock bound, above which the watchdog faults the component; 0: none."""
 
     @classmethod
     def of(cls, told: Any) -> Self:
@@ -50,14 +54,18 @@ class State:
             is_event_wait=bool(told.is_event_wait),
             successors=tuple(told.successors),
             time=_declared_time(told),
+            limit_ns=int(told.max_execution_ns),
         )
 
 
 def _declared_time(told: Any) -> ExecutionTime:
     """The worst case, which a bag of an earlier version lacks; else the bound that is enforced.
 
-    Only a DescribedState names the core that declares it; a StateInfo has the time alone.
+    Only a DescribedState names the core that declares it; a StateInfo has the time alone. A wait asks a guard
+    for each successor but the last.
     """
+    if told.is_wait and len(told.successors) < _TWO:
+        return ExecutionTime(0, "without a guard")
     core = getattr(told, "wcet_core", "")
     if wcet_ns := int(getattr(told, "wcet_ns", 0)):
         return ExecutionTime(wcet_ns, f"declared by core {core}" if core else "declared")
@@ -68,6 +76,9 @@ def _declared_time(told: Any) -> ExecutionTime:
     return ExecutionTime()
 
 
+_TWO = 2
+
+
 @dataclass(frozen=True)
 class Hold:
     """A resource whose lock the component holds for a time, and who says so."""
@@ -76,6 +87,7 @@ class Hold:
     longest_ns: int
     """Execution of one user, from lock to unlock."""
     origin: str = "declared"
+    is_measured: bool = False
 
     def __str__(self) -> str:
         """As `map up to 2.000 ms, declared`."""
@@ -90,7 +102,7 @@ _WITHOUT_LOCK = ("latest_value", _CLIENT)
 
 @dataclass(frozen=True)
 class Machine:
-    """One component. Times in ns."""
+    """One component, or another thread that takes a CPU or a lock. Times in ns."""
 
     name: str
     cpus: tuple[int, ...]
@@ -114,6 +126,9 @@ class Machine:
     """The others of these resources, as far as they have a lock."""
     clients: tuple[str, ...] = ()
     """Resources through which it calls ROS services and waits for their answers, as far as is known."""
+    is_component: bool = True
+    remedy: str = ""
+    """Of another thread whose times are unknown: what to declare."""
 
     @classmethod
     def of(
@@ -154,9 +169,7 @@ class Machine:
     def with_budgets(self, budgets: Mapping[str, ExecutionTime]) -> Self:
         """The same, with these times by state where it has none."""
         states = (
-            state
-            if state.is_wait or state.time.ns is not None
-            else replace(state, time=budgets.get(state.name, state.time))
+            state if state.time.ns is not None else replace(state, time=budgets.get(state.name, state.time))
             for state in self.states
         )
         return replace(self, states=tuple(states))
@@ -164,10 +177,15 @@ class Machine:
     def with_holds(self, times: Mapping[str, ExecutionTime]) -> Self:
         """The same, with these times by resource for locks of which no time is declared."""
         known = {name: times[name] for name in self.undeclared_locks if name in times and times[name].ns}
-        added = (Hold(name, time.ns or 0, time.origin) for name, time in known.items())
+        added = (Hold(name, time.ns or 0, time.origin, time.is_measured) for name, time in known.items())
         holds = sorted((*self.holds, *added), key=lambda hold: hold.resource)
         rest = tuple(name for name in self.undeclared_locks if name not in known)
         return replace(self, holds=tuple(holds), undeclared_locks=rest)
+
+    def without_locks(self, resources: Collection[str]) -> Self:
+        """The same, without undeclared locks of these resources."""
+        rest = tuple(name for name in self.undeclared_locks if name not in resources)
+        return replace(self, undeclared_locks=rest)
 
     @property
     def resources(self) -> set[str]:
@@ -175,9 +193,20 @@ class Machine:
         return {hold.resource for hold in self.holds}
 
     @property
+    def locks(self) -> set[str]:
+        """Resources whose locks it takes."""
+        return {*self.resources, *self.undeclared_locks}
+
+    @property
     def missing(self) -> tuple[str, ...]:
-        """Execution states whose time nobody knows."""
-        return tuple(state.name for state in self.states if not state.is_wait and state.time.ns is None)
+        """States whose time is not known: executions, and waits with guards."""
+        return tuple(state.name for state in self.states if state.time.ns is None)
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """States and locks whose times are measured."""
+        states = (state.name for state in self.states if state.time.is_measured)
+        return (*states, *(hold.resource for hold in self.holds if hold.is_measured))
 
 
 def in_ms(time_ns: int) -> str:

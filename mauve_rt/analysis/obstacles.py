@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 from mauve_rt.analysis.locks import named_twice
 from mauve_rt.analysis.machines import Machine, in_ms
@@ -11,10 +12,14 @@ _CPU = Path("/proc/cpuinfo")
 
 
 def obstacles(machine: Machine, others: Sequence[Machine] = ()) -> Iterator[str]:
-    """Why nothing can be proved of a component, each with what would help.
+    """Why nothing can be proved of a component or of another thread, each with what would help.
 
-    `others`: components of the same architecture; the component may be among them.
+    `others`: components and threads of the same architecture; the component may be among them.
     """
+    if not machine.is_component:
+        if machine.missing:
+            yield f"its time is not declared: {machine.remedy}"
+        return
     if machine.is_python:
         yield "it has parts in Python, which run under the interpreter's lock: write them in C++"
     elif machine.is_python is None:
@@ -26,31 +31,73 @@ def obstacles(machine: Machine, others: Sequence[Machine] = ()) -> Iterator[str]
         yield f"its thread is {machine.policy}: give the process real-time rights"
     if not machine.states:
         yield "nothing tells its states: it is not configured, or was recorded by an earlier version"
-    if machine.missing:
-        states = (state for state in machine.states if state.name in machine.missing)
-        names = ", ".join(
-            f"{state.name} ({why})" if (why := state.time.why_missing) else state.name for state in states
-        )
-        yield f"no time is known of {names}: declare wcet_ns, or measure (--budget-from BAG)"
+    executions = _named(machine, is_wait=False)
+    if executions:
+        yield f"no time is known of {executions}: declare wcet_ns, or measure (--budget-from BAG)"
+    waits = _named(machine, is_wait=True)
+    if waits:
+        yield f"no time is known of the guards of {waits}: declare wcet_ns of the wait, or of its guards"
     yield from _shared_with_other_cpus(machine, others)
+    yield from _unknown_holds(machine, others)
+
+
+def _named(machine: Machine, *, is_wait: bool) -> str:
+    """States without a time."""
+    missing = (state for state in machine.states if state.name in machine.missing)
+    return ", ".join(
+        f"{state.name} ({why})" if (why := state.time.why_missing) else state.name
+        for state in missing
+        if state.is_wait == is_wait
+    )
 
 
 def _shared_with_other_cpus(machine: Machine, others: Sequence[Machine]) -> Iterator[str]:
     """The bound on blocking is for one CPU. Of a component that may run on any CPU this is said already."""
     elsewhere = [other for other in others if machine.cpus and other.cpus and other.cpus != machine.cpus]
-    for hold in machine.holds:
-        names = [other.name for other in elsewhere if hold.resource in other.resources]
+    times_ns = {hold.resource: hold.longest_ns for hold in machine.holds}
+    for resource in sorted(machine.locks):
+        names = [other.name for other in elsewhere if resource in other.locks]
         if names:
-            held = f"{hold.resource} (held up to {in_ms(hold.longest_ns)})"
-            yield f"it shares {held} with {', '.join(names)} on another CPU: one CPU for both, or no lock"
+            held = (
+                f"held up to {in_ms(times_ns[resource])}"
+                if resource in times_ns
+                else "held for an unknown time"
+            )
+            yield (
+                f"it shares {resource} ({held}) with {', '.join(names)} on another CPU: "
+                "one CPU for both, or no lock"
+            )
 
 
-def assumptions_about(
-    machines: Sequence[Machine], *, wakeup_us: float = 0.0, sender_priority: int = 1
-) -> Iterator[str]:
+def _unknown_holds(machine: Machine, others: Sequence[Machine]) -> Iterator[str]:
+    """Locks that one below holds for an unknown time, and that the component or one above it wants."""
+    undeclared = {resource for other in (machine, *others) for resource in other.undeclared_locks}
+    for resource in sorted(undeclared):
+        users = [other for other in others if resource in other.locks]
+        below = [other.name for other in users if other.priority < machine.priority]
+        if below and max(other.priority for other in users) >= machine.priority:
+            yield (
+                f"{', '.join(below)} may hold the lock of {resource} for an unknown time: "
+                "declare longest_hold_ns of the resource"
+            )
+
+
+def unknown_costs(threads: Any) -> Iterator[str]:
+    """Which costs of a release are not known; `threads` has the fields of mauve_msgs/msg/TaskList."""
+    if threads.wakeup_ns < 0:
+        yield "its longest wake-up is not declared: wakeup_us of the executor, or --wakeup-us (mauve doctor)"
+    if threads.overhead_ns < 0:
+        yield (
+            "the cost of a release is not declared: overhead_ns of the executor, or --overhead-ns "
+            "(mauve doctor)"
+        )
+
+
+def assumptions_about(machines: Sequence[Machine]) -> Iterator[str]:
     """What a proof for these components takes for granted, each as what stands behind an `if`."""
-    yield f"threads begin {wakeup_us:g} us after their instants at the latest (--wakeup-us)"
-    yield from _about_locks(machines)
+    yield "each execution ends within its declared time (only max_execution_ns is enforced)"
+    if named_twice(resource for machine in machines for resource in machine.resources):
+        yield "no component holds a lock for longer than longest_hold_ns, or two locks at once"
     for machine in machines:
         if machine.clients:
             yield f"wcet_ns of {machine.name} has its waits for services in it ({', '.join(machine.clients)})"
@@ -63,17 +110,5 @@ def assumptions_about(
     words = _CPU.read_text("utf-8", "replace").split() if _CPU.exists() else []
     if "hypervisor" in words:
         yield "the host of this virtual machine takes no CPU from it"
-    yield "these threads of the executor take next to no time:"
-    yield "- watchdog (99) and safe outputs (98), when a state lasts beyond its bound"
-    yield "- rules (97), when an executor's rule looks or acts"
-    yield f"- sender ({sender_priority}), which sends the messages of bound topics"
-    yield "- trace (1), which collects records"
-
-
-def _about_locks(machines: Sequence[Machine]) -> Iterator[str]:
-    undeclared = named_twice(resource for machine in machines for resource in machine.undeclared_locks)
-    if undeclared:
-        names = ", ".join(undeclared)
-        yield f"components hold the locks of {names} for no time: no longest_hold_ns is declared"
-    if named_twice(resource for machine in machines for resource in machine.resources):
-        yield "no component holds a lock for longer than longest_hold_ns, or two locks at once"
+    yield "no other real-time thread runs on these CPUs, and no interrupt takes one for long"
+    yield "no component faults, stops or is changed, and no rule of the executor acts"

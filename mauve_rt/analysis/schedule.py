@@ -6,7 +6,8 @@ open: which way a component takes, when an event comes, how late a thread begins
 As the Linux kernel does it, threads are queued, not jobs: one that wakes up goes to the end of the queue of
 its priority; one that is preempted stays where it is, and so does one that goes on with the next job without
 a sleep. A lock passes priorities on: its holder goes to the end of the queue of the higher priority, and
-afterwards to the head of its own.
+afterwards to the head of its own. A lock that is given back goes to the most urgent thread that waits for it,
+unless a thread that is more urgent still takes it first.
 """
 
 import heapq
@@ -14,6 +15,7 @@ from collections import Counter, deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from enum import Enum, auto
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 from mauve_rt.analysis.digraph import DigraphTask, Job
@@ -28,6 +30,15 @@ class Member:
     task: DigraphTask
     sections: tuple[tuple[str, int], ...] = ()
     """Resources that each job locks once, and how long. In the longest of its states, one after the other."""
+
+    @cached_property
+    def limits_ns(self) -> dict[str, int]:
+        """Wall-clock bounds of its states, of which less CPU time is declared."""
+        return {
+            state.name: state.limit_ns
+            for state in self.machine.states
+            if state.time.ns is not None and state.time.ns < state.limit_ns
+        }
 
 
 class Choices(Protocol):
@@ -71,6 +82,8 @@ class Cycle:
     """-1: it lasts."""
     next_ns: int = FOREVER_NS
     """The nominal instant that its wait ends at."""
+    too_long: str = ""
+    """The state that lasted beyond its wall-clock bound, where that ends the run."""
 
     @property
     def deadline_ns(self) -> int:
@@ -79,7 +92,7 @@ class Cycle:
 
 
 class Schedule(NamedTuple):
-    """What happened, and the cycle that missed its deadline, the last one to finish; None: none did."""
+    """What happened, and the cycle that missed its deadline or was too long, the last one; None: none was."""
 
     cycles: list[Cycle]
     slices: list[Slice]
@@ -101,6 +114,10 @@ class _Do(Enum):
     EXECUTE = auto()
     LOCK = auto()
     UNLOCK = auto()
+
+
+_RELEASE = ""
+"""Of the execution before the first state."""
 
 
 @dataclass
@@ -151,6 +168,7 @@ class _Cpu:
         self._waiting: list[_Thread] = []  # for a resource
         self._asleep: list[tuple[int, int, _Thread]] = []  # by instant, then the order of members
         self._owners: dict[str, _Thread] = {}
+        self._heirs: dict[str, _Thread] = {}  # of locks that were given back: have not run since
         self._head, self._tail = 0, 0  # places in a queue
         self._order = {member.task.name: number for number, member in enumerate(members)}
         self._cycles: list[Cycle] = []
@@ -217,6 +235,8 @@ class _Cpu:
     def _steps(self, member: Member, job: Job) -> Iterator[_Step]:
         times_ns = {state.name: state.time.ns or 0 for state in member.machine.states}
         longest = max(job.states, key=lambda name: times_ns[name], default="")
+        if job.release_cost_ns:
+            yield _Step(_Do.EXECUTE, _RELEASE, job.release_cost_ns)
         for name in job.states:
             left_ns = times_ns[name]
             for step in self._locking(member, name, left_ns) if name == longest else ():
@@ -245,7 +265,7 @@ class _Cpu:
         if step.do == _Do.LOCK:
             self._lock(thread, step.name)
             return None
-        if not cycle.states or cycle.states[-1][2] >= 0:
+        if step.name != _RELEASE and (not cycle.states or cycle.states[-1][2] >= 0):
             cycle.states.append((step.name, self._now_ns, -1))
         end_ns = self._now_ns + step.left_ns
         until_ns = min(end_ns, self._asleep[0][0]) if self._asleep else end_ns
@@ -257,17 +277,25 @@ class _Cpu:
             return None
         thread.steps.popleft()
         if step.ends:
-            cycle.states[-1] = (step.name, cycle.states[-1][1], until_ns)
+            begin_ns = cycle.states[-1][1]
+            cycle.states[-1] = (step.name, begin_ns, until_ns)
+            limit_ns = thread.member.limits_ns.get(step.name, 0)
+            if limit_ns and until_ns - begin_ns > limit_ns:
+                cycle.finish_ns, cycle.too_long = until_ns, step.name
+                return cycle
         while thread.steps and thread.steps[0].do == _Do.UNLOCK:  # before anybody wakes up at this instant
             self._unlock(thread, thread.steps.popleft().name)
         return None if thread.steps else self._finish(thread)
 
     def _lock(self, thread: _Thread, resource: str) -> None:
-        if resource in self._owners:
+        heir = self._heirs.get(resource)
+        is_behind = heir not in (None, thread) and heir.priority >= thread.priority
+        if resource in self._owners or is_behind:
             self._ready.remove(thread)
             self._waiting.append(thread)
             thread.wanted = resource
         else:
+            self._heirs.pop(resource, None)
             thread.steps.popleft()
             thread.held.append(resource)
             self._owners[resource] = thread
@@ -283,7 +311,7 @@ class _Cpu:
             first.wanted = ""
             self._to_tail(first)
             self._ready.append(first)
-            self._lock(first, resource)
+            self._heirs[resource] = first
         self._inherit()
 
     def _inherit(self) -> None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
-from mauve_rt.analysis.bounds import Bound, Subject, by_cpu
+from mauve_rt.analysis.bounds import Bound, Subject, by_cpu, delaying
 from mauve_rt.analysis.machines import in_ms
 from mauve_rt.analysis.schedule import Cycle, Member, Schedule
 from mauve_rt.analysis.witness import RUNS, witness_of
@@ -15,6 +15,8 @@ class Outcome(StrEnum):
     """What is known."""
 
     SCHEDULABLE = "schedulable"
+    FORECAST = "forecast"
+    REFUTED = "model refuted"
     NOT_SCHEDULABLE = "not schedulable"
     NOT_PROVABLE = "not provable"
     NOT_PROVED = "not proved"
@@ -36,9 +38,21 @@ class Verdict:
         return f"{self.outcome}: {self.why}"
 
 
-def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns: int = 0) -> Verdict:
-    """The verdict on components and their bounds; both with the same `wakeup_ns`."""
-    late = [subject for subject in subjects if not bounds[subject.name].meets_deadline]
+def judge(
+    subjects: Sequence[Subject],
+    bounds: Mapping[str, Bound],
+    *,
+    wakeup_ns: int = 0,
+    unknown: Sequence[str] = (),
+    contradictions: Sequence[str] = (),
+) -> Verdict:
+    """The verdict on components and their bounds; both with the same `wakeup_ns`.
+
+    `unknown`: what is not known beside them, in words: nothing is proved then. `contradictions`: what a
+    recording says against the bounds.
+    """
+    components = [subject for subject in subjects if subject.machine.is_component]
+    late = [subject for subject in components if not bounds[subject.name].meets_deadline]
     for here in by_cpu(subjects):
         if any(subject in late for subject in here):
             members = [_member(subject) for subject in here]
@@ -46,13 +60,32 @@ def judge(subjects: Sequence[Subject], bounds: Mapping[str, Bound], *, wakeup_ns
             if found is not None and found.missed is not None:
                 priorities = {subject.name: subject.machine.priority for subject in here}
                 return Verdict(Outcome.NOT_SCHEDULABLE, _miss(found, found.missed, priorities), found)
-    missing = [subject.name for subject in subjects if subject.obstacles]
+    missing = [subject.name for subject in missing_of(subjects)]
+    missing += ["this computer"] if unknown else []
     if missing:
         return Verdict(Outcome.NOT_PROVABLE, f"something is missing of {', '.join(missing)}")
     if late:
         reasons = "; ".join(_too_long(subject.name, bounds[subject.name]) for subject in late)
         return Verdict(Outcome.NOT_PROVED, f"{reasons}; none of {RUNS} runs misses a deadline")
+    if contradictions:
+        return Verdict(Outcome.REFUTED, "; ".join(contradictions))
+    measured = [subject.name for subject in components if subject.machine.measured]
+    if measured:
+        names = ", ".join(measured)
+        why = f"every component meets its deadline, if no time of {names} is above the measured one"
+        return Verdict(Outcome.FORECAST, why)
     return Verdict(Outcome.SCHEDULABLE, "every component meets its deadline")
+
+
+def missing_of(subjects: Sequence[Subject]) -> list[Subject]:
+    """Components of which something is missing, and threads that may delay one and of which it is."""
+    components = [subject for subject in subjects if subject.machine.is_component]
+    delaying_one = [other for one in components for other in delaying(one, subjects)]
+    return [
+        subject
+        for subject in subjects
+        if subject.obstacles and (subject.machine.is_component or subject in delaying_one)
+    ]
 
 
 def _member(subject: Subject) -> Member:
@@ -73,6 +106,12 @@ def _miss(schedule: Schedule, missed: Cycle, priorities: Mapping[str, int]) -> s
     parts.append(f"{in_ms(own_ns)} of its own")
     idle_ns = missed.finish_ns - missed.nominal_ns - own_ns - sum((others + blocking).values())
     parts += [f"{in_ms(idle_ns)} until its thread begins"] if idle_ns else []
+    if missed.too_long:
+        begin_ns = next(begin for name, begin, _ in missed.states if name == missed.too_long)
+        return (
+            f"{missed.component} is faulted: {missed.too_long} lasts {in_ms(missed.finish_ns - begin_ns)}, "
+            f"above its max_execution_ns; from the release on: {' + '.join(parts)}"
+        )
     return (
         f"{missed.component} misses its deadline at {in_ms(missed.deadline_ns)} after the start and ends "
         f"at {in_ms(missed.finish_ns)}: {' + '.join(parts)}"
@@ -82,4 +121,6 @@ def _miss(schedule: Schedule, missed: Cycle, priorities: Mapping[str, int]) -> s
 def _too_long(name: str, bound: Bound) -> str:
     if bound.response_ns is None:
         return f"{name} has no bound ({bound.reason})"
+    if bound.too_long:
+        return f"{name}: {'; '.join(bound.too_long)}"
     return f"{name} has a bound of {in_ms(bound.response_ns)} and a deadline of {in_ms(bound.deadline_ns)}"

@@ -5,21 +5,33 @@ import json
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
+from mauve_rt.cli.verb import BAD_USAGE, FORECAST, NOT_PROVED, OK, REFUSED, REFUTED
 from mauve_rt.counts import counted
 from mauve_rt.unfinished import beside
 
 if TYPE_CHECKING:
-    from mauve_rt.analysis.bounds import Subject
+    from mauve_rt.analysis.bounds import Bound, Subject
     from mauve_rt.analysis.machines import ExecutionTime, Machine
+    from mauve_rt.analysis.refutation import Measured
+    from mauve_rt.model.threads import ThreadList
     from mauve_rt.modelling.package_model import PackageModel
-    from mauve_rt.trace.reading.statistics import Distribution
+    from mauve_rt.trace.reading.statistics import ComponentStatistics, Distribution
 
     Budgets = Mapping[str, ExecutionTime]
+
+
+@dataclass(frozen=True)
+class _Model:
+    """What is analyzed."""
+
+    components: "list[Machine]"
+    threads: "ThreadList | None"
+    """Beside the components; None: nothing tells of them."""
+
 
 _LEAST_MARGIN = 1.0
 
@@ -65,9 +77,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--wakeup-us",
         type=float,
-        default=0.0,
         metavar="X",
-        help="longest time from an instant to the start of its thread, in us (default 0)",
+        help="longest time from an instant to the start of its thread, in us, in place of the declared one",
+    )
+    parser.add_argument(
+        "--overhead-ns",
+        type=int,
+        metavar="X",
+        help="cost of a release beside the states, in ns, in place of the declared one",
     )
     parser.add_argument(
         "--witness",
@@ -79,75 +96,133 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def main(args: argparse.Namespace) -> int:
-    """Print the model and the verdict; returns the exit status: 0 schedulable, 1 not, 3 not proved."""
+    """Print the model and the verdict; returns the exit status."""
     from mauve_rt.analysis.bounds import Subject, bounds_of  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415
-    from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
-    from mauve_rt.analysis.verdict import Outcome, judge  # noqa: PLC0415
+    from mauve_rt.analysis.obstacles import assumptions_about, unknown_costs  # noqa: PLC0415
+    from mauve_rt.analysis.refutation import contradictions  # noqa: PLC0415
+    from mauve_rt.analysis.threads import machines_of  # noqa: PLC0415
+    from mauve_rt.analysis.verdict import judge  # noqa: PLC0415
     from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
 
-    if not math.isfinite(args.margin) or args.margin < _LEAST_MARGIN:
-        print(f"mauve: --margin: expected 1 or more, found {args.margin:g}", file=sys.stderr)
+    if wrong := _wrong_arguments(args):
+        print(f"mauve: {wrong}", file=sys.stderr)
         return BAD_USAGE
-    if not math.isfinite(args.wakeup_us) or args.wakeup_us < 0:
-        print(f"mauve: --wakeup-us: expected 0 or more, found {args.wakeup_us:g}", file=sys.stderr)
-        return BAD_USAGE
-    if args.write and (args.budget_from is None or not Path(args.target).is_file()):
-        print("mauve: --write: expected an architecture FILE and --budget-from BAG", file=sys.stderr)
-        return BAD_USAGE
-    machines, sender_priority = _machines(args.target, args.model)
+    model = _model(args.target, args.model)
+    components = model.components
+    bag = args.budget_from or (Path(args.target) if _is_bag(Path(args.target)) else None)
+    statistics = _statistics(bag) if bag is not None else {}
+    measured = _measured(statistics)
     if args.budget_from is not None:
-        budgets, holds = _budgets(args.budget_from, args.margin)
-        declared, machines = machines, [one.with_budgets(budgets.get(one.name, {})) for one in machines]
-        machines = with_measured_holds(machines, holds)
+        budgets, holds = _budgets(args.budget_from, statistics, args.margin)
+        declared = components
+        components = [one.with_budgets(budgets.get(one.name, {})) for one in components]
+        components = with_measured_holds(components, holds)
         if args.write:
-            _write(Path(args.target), declared, machines)
-    machines = with_supposed(machines, args.suppose)
-    wakeup_ns = round(args.wakeup_us * 1e3)
-    subjects = [Subject.of(machine, machines) for machine in machines]
+            _write(Path(args.target), declared, components)
+    components = with_supposed(components, args.suppose)
+    threads = _with_costs(model.threads, args)
+    machines = [*components, *machines_of(threads.tasks, components)]
+    unknown = [*unknown_costs(threads)]
+    if model.threads is None:
+        unknown.append("the bag does not tell which threads run beside the components: record it again")
+    wakeup_ns = max(threads.wakeup_ns, 0)
+    overhead_ns = max(threads.overhead_ns, 0)
+    subjects = [Subject.of(machine, machines, overhead_ns=overhead_ns) for machine in machines]
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
-    verdict = judge(subjects, bounds, wakeup_ns=wakeup_ns)
-    assumptions = [*assumptions_about(machines, wakeup_us=args.wakeup_us, sender_priority=sender_priority)]
+    verdict = judge(
+        subjects,
+        bounds,
+        wakeup_ns=wakeup_ns,
+        unknown=unknown,
+        contradictions=[*contradictions(subjects, bounds, measured, wakeup_ns=wakeup_ns)],
+    )
+    assumptions = [*assumptions_about(components)]
     assumptions += [
         f"the parts of {path} are written in C++, but for implementations with a module"
         for path in args.model
     ]
     if args.json:
-        parts = [{**_as_json(subject), "response": asdict(bounds[subject.name])} for subject in subjects]
-        judged = {"outcome": verdict.outcome, "sentence": verdict.sentence}
-        print(json.dumps({"components": parts, "verdict": judged, "assumptions": assumptions}, indent=2))
+        judged = {"outcome": verdict.outcome, "sentence": verdict.sentence, "unknown": unknown}
+        parts = [_as_json(subject, bounds) for subject in subjects]
+        told = {
+            "components": [part for part in parts if part["is_component"]],
+            "threads": [part for part in parts if not part["is_component"]],
+            "wakeup_ns": wakeup_ns,
+            "overhead_ns": overhead_ns,
+            "verdict": judged,
+            "assumptions": assumptions,
+        }
+        print(json.dumps(told, indent=2))
     else:
         from mauve_rt.cli.analyze_view import print_model, print_verdict  # noqa: PLC0415
 
-        print_model(subjects, bounds)
-        print_verdict(verdict, subjects, assumptions)
+        print_model(subjects, bounds, threads)
+        print_verdict(verdict, subjects, assumptions, unknown)
     if verdict.witness is not None and args.witness is not None:
         from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
 
         write_witness(args.witness, [subject.machine for subject in subjects], verdict.witness)
         print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
-    statuses = {Outcome.SCHEDULABLE: OK, Outcome.NOT_SCHEDULABLE: REFUSED}
-    return statuses.get(verdict.outcome, NOT_PROVED)
+    return STATUSES[verdict.outcome.name]
 
 
-def _machines(target: str, models: Sequence[Path]) -> "tuple[list[Machine], int]":
-    """The components of what is named, and the priority of the executor's sender."""
+STATUSES = {
+    "SCHEDULABLE": OK,
+    "NOT_SCHEDULABLE": REFUSED,
+    "NOT_PROVABLE": NOT_PROVED,
+    "NOT_PROVED": NOT_PROVED,
+    "FORECAST": FORECAST,
+    "REFUTED": REFUTED,
+}
+"""By the outcome's name."""
+
+
+def _wrong_arguments(args: argparse.Namespace) -> str:
+    if not math.isfinite(args.margin) or args.margin < _LEAST_MARGIN:
+        return f"--margin: expected 1 or more, found {args.margin:g}"
+    if args.wakeup_us is not None and (not math.isfinite(args.wakeup_us) or args.wakeup_us < 0):
+        return f"--wakeup-us: expected 0 or more, found {args.wakeup_us:g}"
+    if args.overhead_ns is not None and args.overhead_ns < 0:
+        return f"--overhead-ns: expected 0 or more, found {args.overhead_ns}"
+    if args.write and (args.budget_from is None or not Path(args.target).is_file()):
+        return "--write: expected an architecture FILE and --budget-from BAG"
+    return ""
+
+
+def _with_costs(told: "ThreadList | None", args: argparse.Namespace) -> "ThreadList":
+    """The threads, with the costs of a release that the command line says."""
+    from mauve_rt.model.threads import ThreadList  # noqa: PLC0415
+
+    threads = told or ThreadList(-1, -1, ())
+    if args.wakeup_us is not None:
+        threads = replace(threads, wakeup_ns=round(args.wakeup_us * 1e3))
+    if args.overhead_ns is not None:
+        threads = replace(threads, overhead_ns=args.overhead_ns)
+    return threads
+
+
+def _model(target: str, models: Sequence[Path]) -> _Model:
+    """The components of what is named, and the threads beside them."""
     path = Path(target)
     if not path.exists() and target.startswith("/"):
-        return _of_node(target), 1
-    if path.is_dir() or path.suffix in (".mcap", ".db3"):
-        return _of_bag(path), 1
-    return _of_file(path, models)
+        return _of_node(target)
+    return _of_bag(path) if _is_bag(path) else _of_file(path, models)
 
 
-def _of_file(path: Path, models: Sequence[Path]) -> "tuple[list[Machine], int]":
+def _is_bag(path: Path) -> bool:
+    return path.is_dir() or path.suffix in (".mcap", ".db3")
+
+
+def _of_file(path: Path, models: Sequence[Path]) -> _Model:
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.analysis.machines import Machine  # noqa: PLC0415
     from mauve_rt.model import PluginIndex, build, load_architecture, previewed_states  # noqa: PLC0415
     from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
+    from mauve_rt.model.threads import thread_list, uses_of  # noqa: PLC0415
     from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
 
-    model = load_architecture(path)
+    model = load_architecture(path, runs_here=False)
     registry, index = PluginRegistry(), PluginIndex.installed()
     in_python: dict[str, bool] = {}
     for each in models:
@@ -161,26 +236,51 @@ def _of_file(path: Path, models: Sequence[Path]) -> "tuple[list[Machine], int]":
         Machine.of(part, states=states[part.name], is_python=_is_python(part, index, in_python), kinds=kinds)
         for part in architecture.components()
     ]
-    return machines, model.sender.priority
+    if models:
+        machines = [
+            machine if machine.is_python else machine.without_locks(_wait_free(part, kinds))
+            for machine, part in zip(machines, architecture.components(), strict=True)
+        ]
+    has_bounds = any(state.limit_ns for machine in machines for state in machine.states)
+    threads = thread_list(
+        model.executor, uses_of(model), components=len(model.components), has_bounds=has_bounds
+    )
+    return _Model(machines, threads)
 
 
-def _of_node(node: str) -> "list[Machine]":
-    from mauve_msgs.srv import ListComponents  # noqa: PLC0415
+def _wait_free(part: Any, kinds: Mapping[str, str]) -> set[str]:
+    """Resources that a part reads without a lock when it is in C++, as the parts of a model will be."""
+    locking = {port.resource for port in part.ports if port.kind != "read"}
+    return {port.resource for port in part.ports if kinds.get(port.resource) == "shared_data"} - locking
+
+
+def _of_node(node: str) -> _Model:
+    from mauve_msgs.srv import ListComponents, ListTasks  # noqa: PLC0415
     from mauve_rt.cli.client import connected  # noqa: PLC0415
 
     with connected(first=True) as client:
         reply = client.call(ListComponents, f"{node}/list_components", ListComponents.Request())
-    return _of_told(reply.components, {resource.name: resource.kind for resource in reply.resources})
+        threads = client.call(ListTasks, f"{node}/list_tasks", ListTasks.Request()).list
+    kinds = {resource.name: resource.kind for resource in reply.resources}
+    return _Model(_of_told(reply.components, kinds), _threads_of(threads))
 
 
-def _of_bag(path: Path) -> "list[Machine]":
+def _threads_of(told: Any) -> "ThreadList":
+    """Of a mauve_msgs/msg/TaskList."""
+    from mauve_rt.model.threads import ThreadList  # noqa: PLC0415
+
+    return ThreadList(int(told.wakeup_ns), int(told.overhead_ns), tuple(told.tasks))
+
+
+def _of_bag(path: Path) -> _Model:
     import mauve_rt.trace  # noqa: PLC0415
     from mauve_rt.trace.errors import TraceError  # noqa: PLC0415
 
     trace = mauve_rt.trace.open(path)
     if not trace.architecture:
         raise TraceError(f"bag {path}: it does not tell the architecture; record it again with this version")
-    return _of_told(trace.architecture, {})
+    threads = None if trace.threads is None else _threads_of(trace.threads)
+    return _Model(_of_told(trace.architecture, {}), threads)
 
 
 def _of_told(components: Iterable[Any], kinds: Mapping[str, str]) -> "list[Machine]":
@@ -212,22 +312,42 @@ def _is_python(part: Any, index: Any, modelled: Mapping[str, bool] | None = None
     return None if None in plugins else False
 
 
-def _budgets(path: Path, margin: float) -> "tuple[Mapping[str, Budgets], Budgets]":
+def _statistics(bag: Path) -> "dict[str, ComponentStatistics]":
+    import mauve_rt.trace  # noqa: PLC0415
+    from mauve_rt.trace.reading.statistics import all_statistics  # noqa: PLC0415
+
+    return all_statistics(mauve_rt.trace.open(bag))
+
+
+def _measured(statistics: "Mapping[str, ComponentStatistics]") -> "dict[str, Measured]":
+    from mauve_rt.analysis.refutation import Measured  # noqa: PLC0415
+
+    return {
+        name: Measured(
+            response_ns=one.response.max_ns,
+            wakeup_ns=one.wakeup.max_ns,
+            execution_ns={state: each.max_ns for state, each in one.execution.items()},
+            faults=one.faults,
+        )
+        for name, one in statistics.items()
+    }
+
+
+def _budgets(
+    path: Path, statistics: "Mapping[str, ComponentStatistics]", margin: float
+) -> "tuple[Mapping[str, Budgets], Budgets]":
     """What was measured: by component and state, and by resource the longest call of one of its services.
 
     Preemption is in both, in a call the wait for the lock too: too much rather than too little. A trace has
     the calls of call ports only: a resource that is only read and written has no measured time.
     """
-    import mauve_rt.trace  # noqa: PLC0415
     from mauve_rt.analysis.machines import ExecutionTime  # noqa: PLC0415
-    from mauve_rt.trace.reading.statistics import all_statistics  # noqa: PLC0415
 
     def budget(*measured: "Distribution") -> ExecutionTime:
         count, longest_ns = sum(one.count for one in measured), max(one.max_ns for one in measured)
         origin = f"measured in {path.name} (n = {count:,}) x {margin:g}"
-        return ExecutionTime(math.ceil(longest_ns * margin), origin)
+        return ExecutionTime(math.ceil(longest_ns * margin), origin, is_measured=True)
 
-    statistics = all_statistics(mauve_rt.trace.open(path))
     states = {
         component: {state: budget(measured) for state, measured in one.execution.items() if measured.count}
         for component, one in statistics.items()
@@ -274,13 +394,21 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
     print(f"{path}: {counted(count, 'time')} written as wcet_ns; nothing enforces them", file=sys.stderr)
 
 
-def _as_json(subject: "Subject") -> dict[str, Any]:
+def _response(bound: "Bound") -> dict[str, Any]:
+    names = ("response_ns", "deadline_ns", "reason", "blocking_ns", "too_long")
+    return {name: getattr(bound, name) for name in names}
+
+
+def _as_json(subject: "Subject", bounds: "Mapping[str, Bound]") -> dict[str, Any]:
     machine = subject.machine
+    bound = bounds.get(subject.name)
+    times = {one.job: one.response_ns for one in bound.jobs} if bound is not None else {}
+    response = {"response": _response(bound)} if bound is not None else {}
     told = asdict(machine)
     told["states"] = [
         {"name": state.name, "time_ns": state.time.ns, "origin": state.time.origin}
         for state in machine.states
-        if not state.is_wait
+        if not state.is_wait or len(state.successors) > 1
     ]
-    jobs = [asdict(job) for job in subject.task.jobs]
-    return {**told, "jobs": jobs, "not_provable": list(subject.obstacles)}
+    jobs = [{**asdict(job), "response_ns": times.get(job)} for job in subject.task.jobs]
+    return {**told, "jobs": jobs, "not_provable": list(subject.obstacles), **response}

@@ -4,34 +4,71 @@ from collections.abc import Mapping, Sequence
 
 from mauve_rt.analysis.bounds import Bound, Subject
 from mauve_rt.analysis.digraph import Job
-from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
-from mauve_rt.analysis.verdict import Outcome, Verdict
+from mauve_rt.analysis.machines import FOREVER_NS, Machine, State, in_ms
+from mauve_rt.analysis.verdict import Outcome, Verdict, missing_of
+from mauve_rt.model.threads import ThreadList
 
 
-def print_model(subjects: Sequence[Subject], bounds: Mapping[str, Bound]) -> None:
-    """Print each component: its states, its jobs, its bound."""
+def print_model(subjects: Sequence[Subject], bounds: Mapping[str, Bound], threads: ThreadList) -> None:
+    """Print each component: its states, its jobs, its bound; then what else takes a CPU or a lock."""
     for subject in subjects:
-        print(f"{subject.name}: {_scheduling(subject.machine)}")
-        for state in subject.machine.states:
-            if not state.is_wait:
-                print(f"  {state.name}: {state.time}")
-        for hold in subject.machine.holds:
-            print(f"  holds the lock of {hold}")
-        for job in subject.task.jobs:
-            print(f"  job {_job(job)}")
-        if not subject.obstacles:
-            print(f"  response {_response(bounds[subject.name])}")
+        if subject.machine.is_component:
+            _print_component(subject, bounds[subject.name])
+    for subject in subjects:
+        if not subject.machine.is_component:
+            print(_thread(subject))
+    costs = [f"begins up to {in_ms(threads.wakeup_ns)} late"] if threads.wakeup_ns >= 0 else []
+    costs += [f"costs {in_ms(threads.overhead_ns)}"] if threads.overhead_ns >= 0 else []
+    if costs:
+        print(f"each release {' and '.join(costs)}")
 
 
-def print_verdict(verdict: Verdict, subjects: Sequence[Subject], assumptions: Sequence[str]) -> None:
-    """Print it, with what it takes for granted."""
-    if verdict.outcome == Outcome.SCHEDULABLE:
-        _print_list(f"{verdict.sentence}, if", assumptions)
+def _print_component(subject: Subject, bound: Bound) -> None:
+    print(f"{subject.name}: {_scheduling(subject.machine)}")
+    for state in subject.machine.states:
+        if not state.is_wait:
+            print(f"  {state.name}: {state.time}{_limit(state)}")
+        elif len(state.successors) > 1:
+            print(f"  guards of {state.name}: {state.time}")
+    for hold in subject.machine.holds:
+        print(f"  holds the lock of {hold}")
+    times = {one.job: one.response_ns for one in bound.jobs}
+    for job in subject.task.jobs:
+        response = f", response at most {in_ms(times[job])}" if job in times else ""
+        print(f"  job {_job(job)}{response}")
+    if not subject.obstacles:
+        print(f"  response {_response(bound)}")
+    for why in bound.too_long:
+        print(f"  {why}")
+
+
+def _limit(state: State) -> str:
+    return f", faulted above {in_ms(state.limit_ns)}" if state.limit_ns else ""
+
+
+def _thread(subject: Subject) -> str:
+    machine = subject.machine
+    where = f"CPU {', '.join(map(str, machine.cpus))}" if machine.cpus else "any CPU"
+    if not machine.priority:
+        held = ", ".join([*map(str, machine.holds), *machine.undeclared_locks])
+        return f"thread '{machine.name}': holds the lock of {held}"
+    (wait, work) = machine.states
+    often = f" every {in_ms(wait.separation_ns)}" if wait.separation_ns != FOREVER_NS else ""
+    return f"thread '{machine.name}': {where}, priority {machine.priority}, {work.time}{often}"
+
+
+def print_verdict(
+    verdict: Verdict, subjects: Sequence[Subject], assumptions: Sequence[str], unknown: Sequence[str]
+) -> None:
+    """Print it, with its conditions, or with what is missing."""
+    if verdict.outcome in (Outcome.SCHEDULABLE, Outcome.FORECAST):
+        joined = "if" if verdict.outcome == Outcome.SCHEDULABLE else "and"
+        _print_list(f"{verdict.sentence}, {joined}", assumptions)
     elif verdict.outcome == Outcome.NOT_SCHEDULABLE:
         _print_list(f"{verdict.sentence}, if", _REACHED)
     elif verdict.outcome == Outcome.NOT_PROVABLE:
-        found = [f"{subject.name}: {why}" for subject in subjects for why in subject.obstacles]
-        _print_list(f"{verdict.sentence}", found)
+        found = [f"{subject.name}: {why}" for subject in missing_of(subjects) for why in subject.obstacles]
+        _print_list(f"{verdict.sentence}", [*found, *(f"this computer: {why}" for why in unknown)])
     else:
         print(verdict.sentence)
 

@@ -11,12 +11,14 @@ from mauve_rt.errors import MauveError, one_line
 from mauve_rt.node.shared.failures import report_failure
 from mauve_rt.trace.errors import TraceError
 
-OK, REFUSED, BAD_USAGE, NOT_PROVED, INTERRUPTED = 0, 1, 2, 3, 130
+OK, REFUSED, BAD_USAGE, NOT_PROVED, FORECAST, REFUTED, INTERRUPTED = 0, 1, 2, 3, 4, 5, 130
 EXIT_STATUSES: Mapping[int, str] = {
     OK: "done",
     REFUSED: "the executor refused the request; or a check found an error; or `analyze`: not schedulable",
     BAD_USAGE: "bad usage, a file that cannot be read, or no such executor",
     NOT_PROVED: "`analyze` proves neither that the architecture is schedulable nor that it is not",
+    FORECAST: "`analyze`: each deadline is met if no time is above the measured one: no proof",
+    REFUTED: "`analyze`: a recording shows more than the bounds allow",
     INTERRUPTED: "interrupted from the keyboard",
     PIPE_CLOSED: "the reader of the output closed the pipe",
 }

@@ -1,6 +1,6 @@
 """The executor's values as messages of mauve_msgs."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import Any
 
 from mauve_msgs.msg import (
@@ -16,6 +16,8 @@ from mauve_msgs.msg import (
     ShadowOutput,
     StateInfo,
     StepReport,
+    TaskInfo,
+    TaskList,
     TraceArchitecture,
 )
 from mauve_msgs.msg import HeldElement as HeldElementMessage
@@ -34,6 +36,7 @@ from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.control.wishes import step_of
 from mauve_rt.file_schema.words import cut, shown
 from mauve_rt.model.schema import PropertyValue
+from mauve_rt.model.threads import ThreadInfo, is_named, thread_list
 
 _PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
 _MAX_PRIORITY = 255
@@ -146,12 +149,53 @@ def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, Any]]) 
     ]
 
 
-def trace_architecture(runtime: Runtime, observed: Observed) -> Any:
-    """TraceArchitecture as it was observed."""
+def trace_architecture(
+    runtime: Runtime,
+    observed: Observed,
+    uses: Mapping[str, Collection[str]],
+    *,
+    others: Iterable[ThreadInfo] = (),
+) -> Any:
+    """TraceArchitecture as it was observed; `uses` and `others`: as for task_list."""
     return TraceArchitecture(
         epoch_ns=runtime.deployment_epoch_ns(),
         components=_component_infos(runtime, observed.components),
+        threads=task_list(runtime, observed.components, uses, others=others),
     )
+
+
+def task_list(
+    runtime: Runtime,
+    components: Sequence[ComponentDescription],
+    uses: Mapping[str, Collection[str]],
+    *,
+    others: Iterable[ThreadInfo] = (),
+) -> Any:
+    """TaskList: the threads that the settings ask for, and each of `others` that is none of them.
+
+    Args:
+        runtime: what runs.
+        components: of the runtime.
+        uses: how threads that are no components use resources, as `uses_of`.
+        others: real-time threads of the process.
+
+    """
+    all_uses = {resource: {*sides} for resource, sides in uses.items()}
+    for name in runtime.model.recorded:
+        all_uses.setdefault(name, set()).add("records")
+    has_bounds = any(state.max_execution_ns for part in components for state in part.states)
+    known = thread_list(runtime.model.executor, all_uses, components=len(components), has_bounds=has_bounds)
+    names = {each.name for each in known.tasks} | {part.name for part in components}
+    found = [each for each in others if not is_named(each.name, names)]
+    return TaskList(
+        wakeup_ns=known.wakeup_ns,
+        overhead_ns=known.overhead_ns,
+        tasks=[TaskInfo(**_as_fields(each)) for each in (*known.tasks, *found)],
+    )
+
+
+def _as_fields(thread: ThreadInfo) -> dict[str, Any]:
+    return {**vars(thread), "cpus": list(thread.cpus)}
 
 
 def realtime_status(runtime: Runtime) -> Any:

@@ -32,6 +32,7 @@ class ArchitectureModel:
         self.file = file
         self.path: Path = file.path
         self.namespace = overrides.namespace or content.executor.namespace
+        self.executor = content.executor
         self.peers = list(content.executor.peers if overrides.peers is None else overrides.peers)
         self.require_realtime = content.executor.require_realtime
         self.diagnostics = content.executor.diagnostics
@@ -113,10 +114,13 @@ class Overrides:
     )  # by (component, property)
 
 
-def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -> ArchitectureModel:
+def load_architecture(
+    path: str | Path, *, overrides: Overrides | None = None, runs_here: bool = True
+) -> ArchitectureModel:
     """Read a file and check all of it that can be checked without plug-ins.
 
-    Properties are checked by `build`, which knows the shells.
+    `runs_here`: refuse CPUs that this computer does not have. Properties are checked by `build`, which knows
+    the shells.
 
     Raises:
         ArchitectureFileError: with every problem found; `str()` tells of the first.
@@ -126,7 +130,7 @@ def load_architecture(path: str | Path, *, overrides: Overrides | None = None) -
     model = ArchitectureModel(file, content, overrides or Overrides())
     problems = [
         *_override_problems(model, overrides or Overrides()),
-        *element_problems(model),
+        *element_problems(model, runs_here=runs_here),
         *_connection_problems(model),
         *_port_count_problems(model),
         *_value_name_problems(model),
@@ -146,9 +150,12 @@ def online_cpus() -> frozenset[int]:
         return frozenset(range(os.cpu_count() or 1))
 
 
-def element_problems(model: ArchitectureModel) -> Iterator[Problem]:
+def element_problems(model: ArchitectureModel, *, runs_here: bool = True) -> Iterator[Problem]:
     """What is wrong with the executor, components and resources, each taken by itself."""
-    yield from _cpu_problems(model, ("executor", "sender"), "executor's sender", model.sender.cpus)
+    if runs_here:
+        yield from _cpu_problems(model, ("executor", "sender"), "executor's sender", model.sender.cpus)
+        for name, component in model.components.items():
+            yield from _cpu_problems(model, ("components", name), f"component '{name}'", component.cpus)
     yield from _component_problems(model)
     yield from _resource_problems(model)
 
@@ -162,11 +169,10 @@ def _override_problems(model: ArchitectureModel, overrides: Overrides) -> Iterat
 
 
 def _component_problems(model: ArchitectureModel) -> Iterator[Problem]:
-    for name, component in model.components.items():
+    for name in model.components:
         if name in model.resources:
             what = f"'{name}' is the name of a component and of a resource"
             yield model.key_problem(("resources", name), what, remedy="rename one", code="duplicate_name")
-        yield from _cpu_problems(model, ("components", name), f"component '{name}'", component.cpus)
 
 
 def _cpu_problems(

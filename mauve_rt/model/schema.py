@@ -144,6 +144,17 @@ class SenderModel(Section):
     cpus: list[int] | None = kernel_setting(
         "cpus", "CPUs on which the thread may run; without the key any CPU"
     )
+    wcet_ns: int | None = setting(
+        Whole(1, _LONGEST_NS),
+        "worst-case execution time of one activation, which sends all messages that wait, for the timing "
+        "analysis; nothing enforces it",
+        default=None,
+    )
+    min_interarrival_ns: int | None = setting(
+        Whole(1, _LONGEST_NS),
+        "least time from one activation to the next, for the timing analysis; nothing enforces it",
+        default=None,
+    )
 
 
 class MirrorModel(Section):
@@ -185,6 +196,16 @@ class ExecutorModel(Section):
     )
     sender: SenderModel = setting(
         Part(SenderModel), "the thread that sends the messages of bound topics", default=SenderModel()
+    )
+    wakeup_us: float | None = setting(
+        Real(least=0, most=_LONGEST_MS),
+        "longest time from an instant to the start of its thread on this computer, for the timing analysis",
+        default=None,
+    )
+    overhead_ns: int | None = setting(
+        Whole(0, _LONGEST_NS),
+        "cost of a release of a component beside its states on this computer, for the timing analysis",
+        default=None,
     )
     sentinel: bool = setting(
         Flag(),
@@ -374,7 +395,7 @@ class StateModel(Section):
     )
     wcet_ns: int | None = setting(
         Whole(1, _LONGEST_NS),
-        "worst-case execution time for the timing analysis; nothing enforces it",
+        "worst-case execution time, of a wait its guards', for the timing analysis; nothing enforces it",
         default=None,
     )
 

@@ -26,6 +26,7 @@ from mauve_rt.interfaces.recorded_shadows import RecordedShadows
 from mauve_rt.interfaces.told_decisions import DECISION_TYPE, Done
 from mauve_rt.model import load_architecture
 from mauve_rt.model.schema import ResourceModel, TopicModel
+from mauve_rt.model.threads import uses_of
 from mauve_rt.simulation.messages import serialize
 from mauve_rt.simulation.rules import DECISIONS_QOS, SimulatedRules
 from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
@@ -169,7 +170,9 @@ class SimulatedExecutor:
             now = stamp(self._simulation.now_ns())
             state = architecture_state(self._runtime, observed, now, rules=rules)
             self._published_revision = state.revision
-            self._architecture = serialize(trace_architecture(self._runtime, observed))
+            self._architecture = serialize(
+                trace_architecture(self._runtime, observed, uses_of(self._runtime.model))
+            )
             self._say("state", "mauve_msgs/msg/ArchitectureState", state, _STATE_QOS)
         for fault in self._faults.look(observed.components):
             if fault.part.fell_back:

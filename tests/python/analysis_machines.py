@@ -17,9 +17,12 @@ def execution(
     return _state(name, successors, is_initial=initial, **times)
 
 
-def wait(name: str, *successors: str, ms: int, initial: bool = False) -> SimpleNamespace:
-    """For a time."""
-    return _state(name, successors, is_wait=True, duration_ns=ms * MS, is_initial=initial)
+def wait(
+    name: str, *successors: str, ms: int, wcet_ms: float = 0.0, initial: bool = False
+) -> SimpleNamespace:
+    """For a time; `wcet_ms`: of its guards, one for each successor but the last."""
+    times = {"duration_ns": ms * MS, "wcet_ns": round(wcet_ms * MS)}
+    return _state(name, successors, is_wait=True, is_initial=initial, **times)
 
 
 def event(name: str, *successors: str, least_ms: int, initial: bool = False) -> SimpleNamespace:

@@ -49,6 +49,7 @@ class _Cpu:
         self.now = 0
         self.queues: dict[int, deque[Thread]] = defaultdict(deque)
         self.owners: dict[str, Thread] = {}
+        self.heirs: dict[str, Thread] = {}  # woken for a lock: one more urgent may take it first
         self.longest = dict.fromkeys(releases, 0)
         self.order = count()
         self.events: list[tuple[int, int, Thread]] = []
@@ -121,14 +122,17 @@ class _Cpu:
         heapq.heappush(self.events, (until, next(self.order), thread))
 
     def _lock(self, thread: Thread, resource: str) -> None:
-        if resource not in self.owners:
+        heir = self.heirs.get(resource, thread)
+        is_free = resource not in self.owners and (heir is thread or heir.priority < thread.priority)
+        if is_free:
+            self.heirs.pop(resource, None)
             thread.steps.popleft()
             self.owners[resource] = thread
             thread.held.append(resource)
         else:
             self.queues[thread.priority].remove(thread)
             thread.wanted, thread.wants_since = resource, next(self.order)
-            self._inherit()
+        self._inherit()
 
     def _unlock(self, thread: Thread, resource: str) -> None:
         thread.steps.popleft()
@@ -138,9 +142,7 @@ class _Cpu:
         if waiting:
             first = max(waiting, key=lambda other: (other.priority, -other.wants_since))
             first.wanted = ""
-            first.steps.popleft()
-            first.held.append(resource)
-            self.owners[resource] = first
+            self.heirs[resource] = first
             self.queues[first.priority].append(first)
         self._inherit()
 

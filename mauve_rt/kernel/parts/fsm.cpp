@@ -336,7 +336,7 @@ std::vector<DescribedState> FsmBase::describe_states() const {
 void add_core_times(std::vector<DescribedState>& states, const std::string& core, const CoreTimes& times) {
   if (times.empty()) return;
   for (DescribedState& state : states) {
-    if (state.is_wait || state.wcet_ns != 0) continue;
+    if (state.wcet_ns != 0 || (state.is_wait && state.guards.empty())) continue;
     time_ns_t all_ns = 0;
     const auto add = [&](const std::string& method) {
       const auto found = times.find(method);
@@ -346,7 +346,7 @@ void add_core_times(std::vector<DescribedState>& states, const std::string& core
         all_ns = later_by(all_ns, found->second);
       }
     };
-    add(state.action);
+    if (!state.is_wait) add(state.action);
     for (const std::string& guard : state.guards) add(guard);
     state.wcet_core = core;
     if (state.methods_without_wcet.empty()) state.wcet_ns = all_ns;
@@ -356,10 +356,11 @@ void add_core_times(std::vector<DescribedState>& states, const std::string& core
 void FsmBase::take_declared_times() {
   for (const DeclaredState& declared : declared_states_) {
     for (const auto& state : states_) {
-      if (state->name != declared.name || state->is_wait) continue;
+      if (state->name != declared.name) continue;
+      state->wcet_ns = declared.wcet_ns.value_or(state->wcet_ns);
+      if (state->is_wait) continue;
       state->max_execution_ns = declared.max_execution_ns.value_or(state->max_execution_ns);
       state->simulated_execution_ns = declared.simulated_execution_ns.value_or(state->simulated_execution_ns);
-      state->wcet_ns = declared.wcet_ns.value_or(state->wcet_ns);
     }
   }
   for (const auto& state : states_) check_wcet(state->name, state->wcet_ns, state->max_execution_ns);

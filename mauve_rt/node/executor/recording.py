@@ -24,6 +24,7 @@ from mauve_rt.interfaces.qos import qos_profile, recorded_qos
 from mauve_rt.interfaces.recorded_shadows import RecordedShadows
 from mauve_rt.model import message_class
 from mauve_rt.model.schema import QOS_NAMES
+from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.errors import TraceError
@@ -201,7 +202,9 @@ class Recording:
             recorder.tell_architecture(self._architecture(observed))
 
     def _architecture(self, observed: Observed) -> bytes:
-        return _serialized(trace_architecture(self._runtime, observed))
+        return _serialized(
+            trace_architecture(self._runtime, observed, self._bound.bindings(), others=real_time_threads())
+        )
 
     def _choose(self, topics: Sequence[str]) -> Iterator[ChosenTopic]:
         """Each topic once; those that are recorded in any case are left out."""

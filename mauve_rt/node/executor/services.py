@@ -13,6 +13,7 @@ from mauve_msgs.srv import (
     ListChanges,
     ListComponents,
     ListRules,
+    ListTasks,
     LoadRules,
     Mirror,
     ReadValues,
@@ -40,11 +41,13 @@ from mauve_rt.interfaces.descriptions import (
     realtime_status,
     resource_infos,
     step_reports,
+    task_list,
 )
 from mauve_rt.interfaces.values import value_message
 from mauve_rt.model.schema import DEFAULT_MIRROR_HZ
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
+from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.console import log_request
 from mauve_rt.node.executor.events import Event
@@ -103,6 +106,7 @@ class Services:
         self._mirrors = mirrors
         node.create_service(ListComponents, "~/list_components", self._list, callback_group=query_group)
         node.create_service(ListRules, "~/list_rules", self._list_rules, callback_group=query_group)
+        node.create_service(ListTasks, "~/list_tasks", self._list_tasks, callback_group=query_group)
         node.create_service(ReadValues, "~/read_values", self._read_values, callback_group=query_group)
         node.create_service(Mirror, "~/mirror", self._mirror, callback_group=query_group)
         node.create_service(LoadRules, "~/load_rules", self._on_load_rules, callback_group=control_group)
@@ -192,6 +196,12 @@ class Services:
         response.access = self._access()
         response.warnings = self._warnings()
         response.held = held_elements(self._runtime)
+        return response
+
+    def _list_tasks(self, _request: Any, response: Any) -> Any:
+        response.list = task_list(
+            self._runtime, self._runtime.components(), self._bound.bindings(), others=real_time_threads()
+        )
         return response
 
     def _list_changes(self, _request: Any, response: Any) -> Any:

@@ -92,6 +92,7 @@ class _Content:
         self._components: tuple[str, ...] = ()
         self._names: tuple[str, ...] = ()
         self._architecture: tuple[ComponentInfo, ...] = ()
+        self._threads: Any = None
         self._first_grids: dict[str, Deployment] | None = None
         self._known: set[tuple[Path, int]] = set()
         self._types = _Types()
@@ -130,6 +131,7 @@ class _Content:
     def _add_architecture(self, said: Any) -> None:
         told = tuple(ComponentInfo.of_message(component) for component in said.components)
         self._architecture = with_known_policies(told, self._architecture)
+        self._threads = getattr(said, "threads", None)
         if self._first_grids is None:  # later ones are told by the records themselves
             epoch_ns = int(said.epoch_ns)
             self._first_grids = {
@@ -160,6 +162,7 @@ class _Content:
             pairs,
             lambda topics: _messages(files, topics, pairs),
             architecture=self._architecture,
+            threads=self._threads,
             first_grids=self._first_grids or {},
             files=tuple(self.files),
             topics=self._all_topics,

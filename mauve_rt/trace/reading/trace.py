@@ -4,7 +4,7 @@ import heapq
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
@@ -47,6 +47,8 @@ class Trace:
     message_source: MessageSource = field(repr=False, default=lambda _: iter(()))
     architecture: tuple[ComponentInfo, ...] = ()
     """As last told in the bag; empty when it does not tell."""
+    threads: Any = None
+    """Beside the components, as mauve_msgs/msg/TaskList; None: of several executors, or earlier ones."""
     first_grids: Mapping[str, Deployment] = field(default_factory=dict)
     """Grids of components that were deployed before the recording began."""
     files: tuple[BagFile, ...] = ()

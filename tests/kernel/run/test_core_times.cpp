@@ -9,7 +9,7 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Pair;
 
-/// Run asks a guard after its action; Bounded has a bound, Own a worst case of the fsm.
+/// Run asks a guard after its action, and Pause when it has ended; Bounded has a bound, Own a worst case of the fsm.
 struct GuardedFsm : TestFsm {
   void define() override {
     State& run = execution("Run", "act", &TestCore::act);
@@ -75,9 +75,30 @@ TYPED_TEST(CoreTimesOfStates, AreSummedOverTheActionAndTheGuardsOfAState) {
   EXPECT_THAT(this->wcets(previewed), wanted) << "before it is configured";
   EXPECT_EQ("t/Timed", this->state_of(previewed, "Run").wcet_core);
   EXPECT_EQ("", this->state_of(previewed, "Own").wcet_core) << "the fsm declares it";
-  EXPECT_EQ(0, this->state_of(previewed, "Pause").wcet_ns);
   this->deploy();
   EXPECT_THAT(this->wcets(component.described_states()), wanted);
+}
+
+TYPED_TEST(CoreTimesOfStates, OfAWaitAreThoseOfItsGuards) {
+  Component& component = this->add_guarded("t/Timed");
+  const auto previewed = component.previewed_states();
+  EXPECT_EQ(us_to_ns(2), this->state_of(previewed, "Pause").wcet_ns);
+  EXPECT_EQ("t/Timed", this->state_of(previewed, "Pause").wcet_core);
+  this->deploy();
+  EXPECT_EQ(us_to_ns(2), this->wcet_of(component, "Pause"));
+}
+
+TYPED_TEST(CoreTimesOfStates, OfAWaitYieldToTheSettings) {
+  Component& component = this->add_guarded("t/Timed", {.states = {{.name = "Pause", .wcet_ns = us_to_ns(9)}}});
+  EXPECT_EQ(us_to_ns(9), this->state_of(component.previewed_states(), "Pause").wcet_ns);
+  this->deploy();
+  EXPECT_EQ(us_to_ns(9), this->wcet_of(component, "Pause"));
+  EXPECT_EQ(us_to_ns(302), this->wcet_of(component, "Run"));
+}
+
+TYPED_TEST(CoreTimesOfStates, AWaitTakesNoOtherTime) {
+  this->add_guarded("t/Timed", {.states = {{.name = "Pause", .max_execution_ns = us_to_ns(9)}}});
+  EXPECT_THAT(this->refusal([this] { this->architecture.configure(); }).what(), HasSubstr("found Pause"));
 }
 
 TYPED_TEST(CoreTimesOfStates, YieldToTheSettingsAndTheFsm) {
@@ -96,6 +117,7 @@ TYPED_TEST(CoreTimesOfStates, MissingOnesAreNoZeros) {
   EXPECT_THAT(this->wcets(states), ElementsAre(0, us_to_ns(300), us_to_ns(70)));
   EXPECT_THAT(this->state_of(states, "Run").methods_without_wcet, ElementsAre("is_set"));
   EXPECT_THAT(this->state_of(states, "Bounded").methods_without_wcet, IsEmpty());
+  EXPECT_THAT(this->state_of(states, "Pause").methods_without_wcet, ElementsAre("is_set"));
 }
 
 TYPED_TEST(CoreTimesOfStates, AreNotDeclaredWhereTheCoreDeclaresNone) {

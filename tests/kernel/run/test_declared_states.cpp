@@ -146,7 +146,7 @@ TYPED_TEST(DeclaredStates, AWaitHasNoTimes) {
   EXPECT_THAT(this->refused_at_configure({{"Pause", ms_to_ns(1), {}}}).what(), HasSubstr("found Pause"));
 }
 
-TYPED_TEST(DeclaredStates, AWaitHasNoWorstCase) {
+TYPED_TEST(DeclaredStates, AWaitWithoutAGuardHasNoWorstCase) {
   EXPECT_THAT(this->refused_at_configure({{.name = "Pause", .wcet_ns = 1}}).what(), HasSubstr("found Pause"));
 }
 

@@ -1,5 +1,6 @@
 """Bounds of components, only where all that may delay them is known."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 from analysis_machines import MS, connected, execution, machine, wait
@@ -8,11 +9,13 @@ from mauve_rt.analysis.bounds import Bound, Subject, bounds_of
 from mauve_rt.analysis.locks import with_measured_holds
 from mauve_rt.analysis.machines import ExecutionTime, Hold, Machine
 from mauve_rt.analysis.obstacles import assumptions_about
+from mauve_rt.analysis.threads import machines_of
+from mauve_rt.model.threads import ThreadInfo
 
 
 def loop(name: str, cost_ms: float, period_ms: int, **told: object) -> Machine:
     states: list[SimpleNamespace] = [
-        execution("Run", "Pause", bound_ms=cost_ms, initial=True),
+        execution("Run", "Pause", wcet_ms=cost_ms, initial=True),
         wait("Pause", "Run", ms=period_ms),
     ]
     return machine(*states, name=name, **told)
@@ -44,14 +47,32 @@ def test_a_late_wake_up_is_part_of_the_response() -> None:
 
 def test_each_job_has_its_deadline_and_each_way_its_distance() -> None:
     states = [
-        execution("Look", "Short", "Long", bound_ms=1, initial=True),
-        execution("Long", "Rest", bound_ms=4),
+        execution("Look", "Short", "Long", wcet_ms=1, initial=True),
+        execution("Long", "Rest", wcet_ms=4),
         wait("Short", "Look", ms=5),
         wait("Rest", "Look", ms=50),
     ]
     found = bounds(machine(*states, name="two", priority=60), loop("low", 1, 100, priority=50))
-    assert found["two"] == Bound(1 * MS, 5 * MS), "the short way, which is the closest to its deadline"
+    assert found["two"] == Bound(5 * MS, 50 * MS), "the longest"
+    assert {(one.job.until, one.response_ns) for one in found["two"].jobs} == {
+        ("Short", 1 * MS),
+        ("Rest", 5 * MS),
+    }
     assert found["low"] == Bound(6 * MS, 100 * MS), "the long way and itself"
+
+
+def test_a_late_job_is_shown_though_another_one_lasts_longer() -> None:
+    states = [
+        execution("Look", "Short", "Long", wcet_ms=1, initial=True),
+        execution("Long", "Rest", wcet_ms=4),
+        wait("Short", "Look", ms=5),
+        wait("Rest", "Look", ms=50),
+    ]
+    found = bounds(loop("high", 3, 50, priority=70), machine(*states, name="two", priority=60))["two"]
+    assert found == Bound(8 * MS, 50 * MS)
+    late = bounds(loop("high", 5, 50, priority=70), machine(*states, name="two", priority=60))["two"]
+    assert late == Bound(6 * MS, 5 * MS)
+    assert not late.meets_deadline
 
 
 def test_where_one_that_may_delay_it_is_unknown_there_is_no_bound() -> None:
@@ -127,12 +148,20 @@ def test_a_wait_for_a_service_counts_as_execution_and_with_locks_nothing_is_prov
     assert found["user"].reason == "after each wait for a service (lamp) a lock may block it anew"
 
 
-def test_a_lock_that_nobody_declares_is_held_for_no_time() -> None:
-    found = bounds(
+def test_of_whom_a_lock_may_block_for_an_unknown_time_nothing_is_proved() -> None:
+    machines = (
+        loop("top", 1, 20, priority=70),
         loop("user", 1, 20, priority=60, ports=connected(map=0)),
+        loop("between", 1, 20, priority=50),
         loop("holder", 4, 50, priority=40, ports=connected(map=0)),
+        loop("alone", 1, 90, priority=30, ports=connected(log=0)),
     )
-    assert found["user"] == Bound(1 * MS, 20 * MS)
+    why = ("holder may hold the lock of map for an unknown time: declare longest_hold_ns of the resource",)
+    reasons = {one.name: Subject.of(one, machines).obstacles for one in machines}
+    assert reasons == {"top": (), "user": why, "between": why, "holder": (), "alone": ()}
+    latest = {"kinds": {"map": "latest_value"}}
+    one, two = (loop(name, 1, 20, ports=connected(map=0), **latest) for name in ("one", "two"))
+    assert Subject.of(one, (one, two)).obstacles == ()
 
 
 def test_a_resource_of_two_cpus_keeps_its_users_from_being_proved() -> None:
@@ -144,9 +173,10 @@ def test_a_resource_of_two_cpus_keeps_its_users_from_being_proved() -> None:
     )
     reasons = {one.name: Subject.of(one, machines).obstacles for one in machines}
     why = "it shares map (held up to 2.000 ms) with {} on another CPU: one CPU for both, or no lock"
+    unknown = "it shares scan (held for an unknown time) with {} on another CPU: one CPU for both, or no lock"
     assert reasons == {
-        "here": (why.format("there"),),
-        "there": (why.format("here"),),
+        "here": (why.format("there"), unknown.format("there")),
+        "there": (why.format("here"), unknown.format("here")),
         "other": (),
         "below": (),
     }
@@ -169,36 +199,127 @@ def test_one_of_which_nothing_is_proved_delays_those_that_wait_for_its_lock_too(
         assert found["top"].response_ns == 1 * MS
 
 
-def test_locks_that_are_shared_and_undeclared_are_told_as_taken_for_granted() -> None:
-    def told(*machines: Machine) -> list[str]:
-        return [line for line in assumptions_about(machines) if "lock" in line]
-
-    latest = {"kinds": {"pose": "latest_value"}}
-    ports = connected(scan=0, pose=0, map=2)
-    one, two = loop("one", 1, 20, ports=ports, **latest), loop("two", 1, 20, ports=ports, **latest)
-    alone = loop("alone", 1, 20, ports=connected(log=0))
+def test_what_is_taken_for_granted_of_locks_is_told_where_there_are_any() -> None:
     rest = "no component holds a lock for longer than longest_hold_ns, or two locks at once"
-    assert told(one, alone) == []
-    assert told(one, two, alone) == [
-        "components hold the locks of scan for no time: no longest_hold_ns is declared",
-        rest,
-    ]
-    unknown = loop("two", 1, 20, ports=connected(scan=0, pose=0))
-    assert told(unknown, unknown) == [
-        "components hold the locks of pose, scan for no time: no longest_hold_ns is declared"
-    ]
+    one, two = loop("one", 1, 20, ports=connected(map=2)), loop("two", 1, 20, ports=connected(map=2))
+    assert rest in [*assumptions_about([one, two])]
+    assert rest not in [*assumptions_about([one, loop("alone", 1, 20)])]
 
 
 def test_measured_holds_are_taken_of_undeclared_locks_of_one_cpu() -> None:
-    times = {name: ExecutionTime(3 * MS, "measured") for name in ("map", "scan", "far", "log", "other")}
+    times = {
+        name: ExecutionTime(3 * MS, "measured", is_measured=True)
+        for name in ("map", "scan", "far", "log", "other")
+    }
     machines = [
         loop("user", 1, 20, priority=60, ports=connected(map=2, scan=0, far=0, log=0, quiet=0)),
         loop("holder", 4, 50, priority=40, ports=connected(map=2, scan=0, far=0, quiet=0)),
         loop("there", 1, 20, priority=60, ports=connected(far=0), cpus=[1]),
     ]
     user, holder, there = with_measured_holds(machines, times)
-    held = (Hold("map", 2 * MS), Hold("scan", 3 * MS, "measured"))
+    held = (Hold("map", 2 * MS), Hold("scan", 3 * MS, "measured", is_measured=True))
     assert (user.holds, user.undeclared_locks) == (held, ("far", "log", "quiet"))
     assert (holder.holds, holder.undeclared_locks) == (held, ("far", "quiet"))
     assert there == machines[2]
-    assert bounds(user, holder, there)["user"].blocking_ns == 3 * MS
+    assert Subject.of(user, (user, holder)).obstacles == (
+        "holder may hold the lock of far for an unknown time: declare longest_hold_ns of the resource",
+        "holder may hold the lock of quiet for an unknown time: declare longest_hold_ns of the resource",
+    )
+
+
+# ---- guards, the cost of a release, wall-clock bounds, waits for services
+
+
+def test_guards_of_a_wait_are_part_of_the_job_that_follows() -> None:
+    def guarded(guards_ms: float) -> Machine:
+        states = [
+            execution("Run", "Pause", wcet_ms=1, initial=True),
+            wait("Pause", "Run", "Run", ms=10, wcet_ms=guards_ms),
+        ]
+        return machine(*states, name="high", priority=60)
+
+    low = loop("low", 1, 20, priority=50)
+    found = bounds(guarded(2), low)
+    assert (found["high"].response_ns, found["low"].response_ns) == (3 * MS, 4 * MS)
+    unknown = guarded(0)
+    (why,) = Subject.of(unknown).obstacles
+    assert why == "no time is known of the guards of Pause: declare wcet_ns of the wait, or of its guards"
+    assert bounds(unknown, low)["low"].response_ns is None
+
+
+def test_each_release_costs_something() -> None:
+    machines = (loop("high", 1, 4, priority=60), loop("low", 3, 20, priority=50))
+    subjects = [Subject.of(one, machines, overhead_ns=MS // 10) for one in machines]
+    found = bounds_of(subjects)
+    assert found["high"].response_ns == 11 * MS // 10
+    assert found["low"].response_ns == 53 * MS // 10, "two releases of high, and its own"
+
+
+def test_a_state_with_a_wall_clock_bound_must_end_in_it_with_all_that_preempts() -> None:
+    high = loop("high", 5, 10, priority=60)
+    for bound_ms, is_met in ((9, True), (8.9, False)):
+        states = [
+            execution("Run", "Pause", wcet_ms=4, bound_ms=bound_ms, initial=True),
+            wait("Pause", "Run", ms=47),
+        ]
+        found = bounds(high, machine(*states, name="low", priority=50))["low"]
+        assert found.response_ns == 9 * MS
+        assert found.meets_deadline == is_met
+        assert bool(found.too_long) != is_met
+    assert found.too_long == (
+        "Run may last 9.000 ms, preemption and blocking included, and its max_execution_ns is 8.900 ms",
+    )
+
+
+def test_one_that_waits_for_a_service_meets_its_equals_again() -> None:
+    kinds = {"lamp": "client"}
+    caller = loop("caller", 3, 90, ports=connected(lamp=0), kinds=kinds)
+    other = loop("other", 8, 15)
+    assert bounds(caller, other)["caller"].response_ns == 11 * MS + 8 * MS - 8 * MS
+    longer = loop("caller", 9, 90, ports=connected(lamp=0), kinds=kinds)
+    assert bounds(longer, other)["caller"].response_ns == 25 * MS, "twice the other"
+    assert bounds(loop("caller", 9, 90), other)["caller"].response_ns == 17 * MS
+
+
+def test_a_load_of_exactly_one_is_bounded_where_nothing_comes_on_top() -> None:
+    full = (loop("high", 2, 4, priority=60), loop("low", 4, 8, priority=50))
+    assert bounds(*full)["low"] == Bound(8 * MS, 8 * MS)
+    late = bounds(*full, wakeup_ns=1)["low"]
+    assert late.reason == (
+        "the utilization at this priority is 1, and blocking or late wake-ups come on top: nothing is left"
+    )
+
+
+# ---- threads beside the components
+
+
+def with_threads(components: list[Machine], *threads: ThreadInfo) -> dict[str, Bound]:
+    machines = [*components, *machines_of(threads, components)]
+    return bounds_of([Subject.of(one, machines) for one in machines])
+
+
+def test_a_thread_that_takes_a_lock_blocks_as_one_below() -> None:
+    components = [loop("user", 1, 20, priority=60, ports=connected(store=9)), loop("low", 1, 50)]
+    offered = ThreadInfo("service of store", resource="store")
+    found = with_threads(components, offered)
+    assert found["user"] == Bound(10 * MS, 20 * MS, blocking_ns=9 * MS)
+    assert [*found] == ["user", "low"]
+    assert found["low"].blocking_ns == 9 * MS, "the thread inherits the priority of user"
+    elsewhere = with_threads(components, ThreadInfo("service of other", resource="other"))
+    assert elsewhere["user"].blocking_ns == 0
+    unknown = [loop("user", 1, 20, ports=connected(store=0))]
+    assert with_threads(unknown)["user"].response_ns == 1 * MS
+    assert with_threads(unknown, offered)["user"].response_ns is None
+
+
+def test_a_real_time_thread_delays_those_below_it_on_each_cpu_where_it_may_run() -> None:
+    components = [loop("here", 1, 20, cpus=[0]), loop("there", 1, 20, cpus=[1])]
+    known = ThreadInfo("topics_out", 70, wcet_ns=2 * MS, min_interarrival_ns=10 * MS)
+    assert {one.response_ns for one in with_threads(components, known).values()} == {3 * MS}
+    pinned = with_threads(components, replace(known, cpus=(1,)))
+    assert (pinned["here"].response_ns, pinned["there"].response_ns) == (1 * MS, 3 * MS)
+    below = with_threads(components, replace(known, priority=10))
+    assert below["here"].response_ns == 1 * MS
+    unknown = with_threads(components, ThreadInfo("topics_out", 70, (1,)))
+    assert unknown["here"].response_ns == 1 * MS
+    assert unknown["there"].reason == "topics_out may delay it, and nothing is proved of that"

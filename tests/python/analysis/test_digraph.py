@@ -85,21 +85,34 @@ def test_what_no_way_leads_to_is_left_out() -> None:
 def test_a_missing_time_makes_the_cost_of_its_jobs_unknown_and_of_no_others() -> None:
     one = machine(
         execution("Known", "Pause", bound_ms=1, initial=True),
-        wait("Pause", "Known", "Unknown", ms=10),
+        wait("Pause", "Known", "Unknown", ms=10, wcet_ms=1),
         execution("Unknown", "Rest"),
         wait("Rest", "Known", ms=20),
     )
     assert one.missing == ("Unknown",)
     task = digraph_of(one)
     assert {(job.after, job.until): job.cost_ns for job in task.jobs} == {
-        (START, "Pause"): MS, ("Pause", "Pause"): MS, ("Pause", "Rest"): None, ("Rest", "Pause"): MS,
+        (START, "Pause"): MS, ("Pause", "Pause"): 2 * MS, ("Pause", "Rest"): None, ("Rest", "Pause"): MS,
     }  # fmt: skip
     assert task.largest_cost_ns is None
     filled = one.with_budgets(
         {"Unknown": ExecutionTime(3 * MS, "measured"), "Known": ExecutionTime(9 * MS, "no")}
     )
     assert filled.missing == ()
-    assert digraph_of(filled).largest_cost_ns == 3 * MS, "what is declared stays"
+    assert digraph_of(filled).largest_cost_ns == 4 * MS, "what is declared stays"
+
+
+def test_a_release_costs_the_guards_of_its_wait_and_what_the_computer_takes() -> None:
+    one = machine(
+        wait("Pause", "Run", "Run", ms=10, wcet_ms=2, initial=True),
+        execution("Run", "Brief", wcet_ms=5),
+        wait("Brief", "Pause", ms=1),
+    )
+    jobs = digraph_of(one, overhead_ns=MS // 2).jobs
+    assert [(job.after, job.release_cost_ns, job.cost_ns) for job in jobs] == [
+        ("Pause", 5 * MS // 2, 15 * MS // 2),
+        ("Brief", MS // 2, MS // 2),
+    ]
 
 
 def test_a_machine_that_is_not_configured_has_no_jobs() -> None:
@@ -115,7 +128,7 @@ def walk(one: Machine, steps: int, chance: random.Random) -> list[tuple[str, int
         if at.is_wait:
             if after or cost_ns:
                 done.append((after, cost_ns, at.name))
-            after, cost_ns = at.name, 0
+            after, cost_ns = at.name, at.time.ns or 0
         else:
             cost_ns += at.time.ns or 0
         at = states[chance.choice(at.successors)]
@@ -134,7 +147,7 @@ def random_machine(chance: random.Random) -> Machine:
         )
     everything = [f"E{number}" for number in range(count)] + waits
     states += [
-        wait(name, *chance.choices(everything, k=chance.randint(1, 2)), ms=chance.randint(1, 9))
+        wait(name, *chance.choices(everything, k=chance.randint(1, 2)), ms=chance.randint(1, 9), wcet_ms=2)
         for name in waits
     ]
     return machine(*states)

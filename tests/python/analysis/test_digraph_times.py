@@ -260,8 +260,8 @@ def test_the_bounds_are_within_5_percent_of_exact_for_95_percent() -> None:
 
 
 def test_what_is_overloaded_has_no_bound_and_says_so() -> None:
-    components = [Component(loop("high", 6, 10), 2), Component(loop("low", 4, 10), 1)]
+    components = [Component(loop("high", 6, 10), 2), Component(loop("low", 5, 10), 1)]
     found = digraph_times(components)
     assert found["high"].response_ns == 6
     assert found["low"].response_ns is None
-    assert found["low"].reason == "the utilization at this priority is 1: nothing is left"
+    assert found["low"].reason == "the utilization at this priority is 1.1: nothing is left"

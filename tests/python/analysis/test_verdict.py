@@ -1,6 +1,7 @@
 """Verdicts: schedulable, not (with a run that shows it), not proved, not provable; and the runs."""
 
 import re
+from dataclasses import replace
 from itertools import pairwise
 from math import gcd
 from random import Random
@@ -22,7 +23,7 @@ from mauve_rt.analysis.witness import witness_of
 
 def loop(name: str, cost_ms: float, period_ms: int, priority: int, **told: object) -> Machine:
     return machine(
-        execution("Run", "Pause", bound_ms=cost_ms, initial=True),
+        execution("Run", "Pause", wcet_ms=cost_ms, initial=True),
         wait("Pause", "Run", ms=period_ms),
         name=name,
         priority=priority,
@@ -91,7 +92,7 @@ def test_another_cpu_has_its_own_run() -> None:
 def test_an_event_can_come_at_the_worst_time() -> None:
     sporadic = machine(
         event("Await", "Run", least_ms=20, initial=True),
-        execution("Run", "Await", bound_ms=4),
+        execution("Run", "Await", wcet_ms=4),
         name="sporadic",
         priority=60,
     )
@@ -210,6 +211,53 @@ def test_runs_are_those_of_the_other_simulation(*, locks: bool) -> None:
         )
     assert compared > 200
     assert bool(delayed) == locks, "by a holder of lower priority"
+
+
+class AtOnce(Drawn):
+    """Each job at its offset, once; a lock as the last of a job."""
+
+    def __init__(self) -> None:
+        pass
+
+    def first(self, member: Member) -> tuple[Job, int]:
+        return member.task.jobs[0], member.machine.offset_ns
+
+    def next(self, _member: Member, _job: Job) -> None:
+        return None
+
+    def late_ns(self) -> int:
+        return 0
+
+    def before_locks_ns(self, left_ns: int) -> int:
+        return left_ns
+
+
+def test_a_more_urgent_thread_takes_a_lock_before_the_one_that_was_woken_for_it() -> None:
+    """Low gives the lock back at 10; mid has waited for it since 5; high comes at 10 and is first."""
+
+    def of(name: str, priority: int, offset: int, *, cost: int, held: int) -> Member:
+        one = machine(execution("Run", "End", wcet_ms=cost / MS), name=name, priority=priority)
+        job = Job("Start", ("Run",), cost, "End", 1000, 10**9)
+        sections = (("A", held),)
+        return Member(replace(one, offset_ns=offset), DigraphTask(name, (job,)), sections)
+
+    members = [
+        of("low", 1, 0, cost=10, held=10),
+        of("mid", 2, 5, cost=4, held=4),
+        of("high", 3, 10, cost=3, held=3),
+    ]
+    done = {cycle.component: cycle.finish_ns for cycle in run(members, AtOnce(), most_jobs=9).cycles}
+    assert (done["high"], done["mid"]) == (13, 17)
+    tasks = [
+        Task(name=name, cpu=0, priority=priority, separation_ns=1, cost_ns=1, deadline_ns=1)
+        for name, priority in (("low", 1), ("mid", 2), ("high", 3))
+    ]
+    programs = {"low": (0, 10), "mid": (5, 4), "high": (10, 3)}
+    releases = {
+        name: [Release(at, at, [(LOCK, "A"), (RUN, held), (UNLOCK, "A")])]
+        for name, (at, held) in programs.items()
+    }
+    assert simulate(tasks, releases) == {"low": 10, "mid": 12, "high": 3}
 
 
 def test_one_has_the_processor_and_it_is_one_of_the_most_urgent() -> None:

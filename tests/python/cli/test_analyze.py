@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from synthetic_traces import deploy, record, run
+from synthetic_traces import EPOCH_NS, MS, deploy, record, run
 
 from mauve_rt.cli.main import main
 from mauve_rt.trace.format.records import Kind
@@ -19,6 +19,7 @@ BOUND = "declared (its bound)"
 
 ROBOT = """\
 mauve: 1
+executor: {wakeup_us: 0, overhead_ns: 0}
 components:
   one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
         priority: 40, cpus: [0], properties: {period_ms: 20}, deadline_ns: 5000000,
@@ -77,10 +78,14 @@ def test_a_worst_case_comes_before_the_bound_that_is_enforced(told: Callable[...
     assert both["states"] == [{"name": "Count", "time_ns": 200_000, "origin": "declared"}]
     bound = told(ROBOT.replace("wcet_ns", "max_execution_ns"))["one"]
     assert bound["states"] == [{"name": "Count", "time_ns": 200_000, "origin": BOUND}]
+    assert bound["response"]["too_long"] == [
+        "Count may last 0.223 ms, preemption and blocking included, and its max_execution_ns is 0.200 ms"
+    ], "the watchdog looks"
 
 
 TIMED = """\
 mauve: 1
+executor: {wakeup_us: 0, overhead_ns: 0}
 components:
   one: {shell: executor_tests/TimedShell, core: executor_tests/Timed, fsm: executor_tests/TimedFsm,
         priority: 40, cpus: [0], states: {Again: {wcet_ns: 250000}}}
@@ -124,11 +129,12 @@ def test_the_model_in_words(analyze: Analyze) -> None:
     assert (
         "one: CPU 0, priority 40, period 20.000 ms, deadline 5.000 ms, overrun skip\n"
         "  Count: 0.200 ms, declared\n"
-        "  job the start -> Count -> Pause: at most 0.200 ms, the next one 20.000 ms later\n"
+        "  job the start -> Count -> Pause: at most 0.200 ms, the next one 20.000 ms later, "
     ) in out
     assert "  Count: missing\n" in out
     assert "  response without a bound: guard may delay it, and nothing is proved of that\n" not in out
-    assert "  response at most 0.200 ms, its deadline of 5.000 ms is met\n" in out
+    assert "  response at most 0.223 ms, its deadline of 5.000 ms is met\n" in out
+    assert "thread 'watchdog': any CPU, priority 99, 0.023 ms, declared every 1.000 ms\n" in out, "of guard"
     assert out.endswith(
         "not provable: something is missing of guard, python\n"
         "  guard: it may run on any CPU: pin it to one (cpus in the architecture file)\n"
@@ -140,11 +146,12 @@ def test_the_model_in_words(analyze: Analyze) -> None:
 
 PAIR = """\
 mauve: 1
+executor: {wakeup_us: 0, overhead_ns: 0}
 components:
   quick: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
-          priority: 40, cpus: [0], properties: {period_ms: 10}, states: {Count: {max_execution_ns: 3000000}}}
+          priority: 40, cpus: [0], properties: {period_ms: 10}, states: {Count: {wcet_ns: 3000000}}}
   slow: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
-         priority: 30, cpus: [0], properties: {period_ms: 20}, states: {Count: {max_execution_ns: 13950000}}}
+         priority: 30, cpus: [0], properties: {period_ms: 20}, states: {Count: {wcet_ns: 13950000}}}
 """
 
 
@@ -152,8 +159,8 @@ def test_what_is_schedulable_is_so_under_conditions(analyze: Analyze) -> None:
     status, out, err = analyze(PAIR)
     assert (status, err) == (0, "")
     assert "\nschedulable: every component meets its deadline, if\n" in out
-    assert "  threads begin 0 us after their instants at the latest (--wakeup-us)\n" in out
-    assert "  - sender (1), which sends the messages of bound topics\n" in out
+    assert "  each execution ends within its declared time (only max_execution_ns is enforced)\n" in out
+    assert "  no component faults, stops or is changed, and no rule of the executor acts\n" in out
 
 
 SHARED = (
@@ -162,7 +169,8 @@ SHARED = (
 resources:
   number: {kind: ring_buffer, capacity: 4, overwrite: true, type: std_msgs/msg/Float64,
            longest_hold_ns: 1100000}
-  other: {kind: ring_buffer, capacity: 4, overwrite: true, type: std_msgs/msg/Float64}
+  other: {kind: ring_buffer, capacity: 4, overwrite: true, type: std_msgs/msg/Float64,
+          longest_hold_ns: 50000}
 connections:
   - [quick.set, number.read]
   - [quick.count, other.write]
@@ -179,12 +187,21 @@ def test_a_lock_that_is_held_blocks_and_is_shown(analyze: Analyze) -> None:
     met = "its deadline of 10.000 ms is met, blocked up to 1.100 ms\n"
     assert f"  response at most 4.100 ms, {met}" in out
     assert "  response at most 19.950 ms, its deadline of 20.000 ms is met\n" in out, "nobody is below"
-    assert "  components hold the locks of other for no time: no longest_hold_ns is declared\n" in out
     status, out, err = analyze(SHARED, "--json")
     quick = json.loads(out)["components"][0]
-    assert quick["holds"] == [{"resource": "number", "longest_ns": 1_100_000, "origin": "declared"}]
-    assert quick["undeclared_locks"] == ["other"]
+    assert [(hold["resource"], hold["longest_ns"], hold["origin"]) for hold in quick["holds"]] == [
+        ("number", 1_100_000, "declared"),
+        ("other", 50_000, "declared"),
+    ]
+    assert quick["undeclared_locks"] == []
     assert quick["response"]["blocking_ns"] == 1_100_000
+    status, out, err = analyze(SHARED.replace(",\n          longest_hold_ns: 50000", ""))
+    assert (status, err) == (3, "")
+    assert out.endswith(
+        "not provable: something is missing of quick\n"
+        "  quick: slow may hold the lock of other for an unknown time: declare longest_hold_ns of the "
+        "resource\n"
+    )
 
 
 def test_what_blocks_too_long_is_not_proved(analyze: Analyze) -> None:
@@ -198,7 +215,8 @@ def test_a_lock_of_two_cpus_is_not_provable(analyze: Analyze) -> None:
     status, out, err = analyze(text)
     assert (status, err) == (3, "")
     why = "it shares number (held up to 1.100 ms) with {} on another CPU: one CPU for both, or no lock"
-    assert f"  quick: {why.format('slow')}\n  slow: {why.format('quick')}\n" in out
+    assert f"  quick: {why.format('slow')}\n" in out
+    assert f"  slow: {why.format('quick')}\n" in out
 
 
 @pytest.mark.parametrize("kind", ["latest_value", "shared_data", "ring_buffer, capacity: 4"])
@@ -220,10 +238,9 @@ def test_a_lock_that_nobody_declares_takes_the_longest_measured_call(
         source.add(component, Kind.SERVICE_END, begin_ns + held_ns, name="number.read")
     bag = record(source, tmp_path / "bag")
     text = SHARED.replace(",\n           longest_hold_ns: 1100000", "")
-    _, out, _ = analyze(text, "--budget-from", str(bag), "--margin", "2")
+    _, out, _ = analyze(text, "--budget-from", str(bag), "--margin", "2", "--wakeup-us", "10")
     assert "  holds the lock of number up to 1.800 ms, measured in bag (n = 2) x 2\n" in out
     assert "is met, blocked up to 1.800 ms\n" in out
-    assert "  components hold the locks of other for no time: no longest_hold_ns is declared\n" in out
     _, out, _ = analyze(SHARED, "--budget-from", str(bag), "--margin", "2")
     assert "  holds the lock of number up to 1.100 ms, declared\n" in out, "what is declared stays"
 
@@ -294,22 +311,22 @@ def test_a_time_in_virtual_time_is_no_bound(told: Callable[..., dict[str, Any]])
         (
             "deadline_ns: 5000000",
             "deadline_ns: 0",
-            "robot.yaml:4:76: bad deadline_ns of component 'one': expected at least 1",
+            "robot.yaml:5:76: bad deadline_ns of component 'one': expected at least 1",
         ),
         (
             "deadline_ns: 5000000",
             "deadline_ns: -1",
-            "robot.yaml:4:76: bad deadline_ns of component 'one': expected at least 1",
+            "robot.yaml:5:76: bad deadline_ns of component 'one': expected at least 1",
         ),
         (
             "wcet_ns: 200000",
             "max_execution_ns: 0",
-            "robot.yaml:5:44: bad max_execution_ns in states.Count of component 'one': expected at least 1",
+            "robot.yaml:6:44: bad max_execution_ns in states.Count of component 'one': expected at least 1",
         ),
         (
             "wcet_ns: 200000",
             "wcet_ns: 0",
-            "robot.yaml:5:35: bad wcet_ns in states.Count of component 'one': expected at least 1",
+            "robot.yaml:6:35: bad wcet_ns in states.Count of component 'one': expected at least 1",
         ),
         (
             "wcet_ns: 200000",
@@ -324,7 +341,7 @@ def test_a_time_in_virtual_time_is_no_bound(told: Callable[..., dict[str, Any]])
         (
             "wcet_ns: 200000",
             "simulated_execution_ns: -5",
-            "robot.yaml:5:50: bad simulated_execution_ns in states.Count of component 'one': expected at",
+            "robot.yaml:6:50: bad simulated_execution_ns in states.Count of component 'one': expected at",
         ),
         (
             "wcet_ns: 200000",
@@ -347,10 +364,11 @@ def test_bad_times_are_refused_where_they_stand(
 def test_the_latency_of_the_machine_is_in_the_bound(told: Callable[..., dict[str, Any]]) -> None:
     response = told(ROBOT, "--wakeup-us", "50")["one"]["response"]
     assert response == {
-        "response_ns": 250_000,
+        "response_ns": 273_000,
         "deadline_ns": 5_000_000,
         "reason": "",
         "blocking_ns": 0,
+        "too_long": [],
     }
 
 
@@ -377,3 +395,90 @@ def test_to_write_asks_for_a_bag(analyze: Analyze, words: tuple[str, ...]) -> No
 def test_what_is_not_there_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["analyze", "nowhere.yaml"]) == 2
     assert "nowhere.yaml" in capsys.readouterr().err
+
+
+# ---- what else takes a CPU or a lock
+
+
+def test_an_unknown_cost_is_no_zero(analyze: Analyze) -> None:
+    text = PAIR.replace("executor: {wakeup_us: 0, overhead_ns: 0}\n", "")
+    status, out, _ = analyze(text)
+    assert status == 3
+    assert out.endswith(
+        "not provable: something is missing of this computer\n"
+        "  this computer: its longest wake-up is not declared: wakeup_us of the executor, or --wakeup-us "
+        "(mauve doctor)\n"
+        "  this computer: the cost of a release is not declared: overhead_ns of the executor, or "
+        "--overhead-ns (mauve doctor)\n"
+    )
+    assert analyze(text, "--wakeup-us", "10", "--overhead-ns", "0")[0] == 0
+    assert analyze(text, "--wakeup-us", "10")[0] == 3
+    status, _, err = analyze(text, "--overhead-ns", "-1")
+    assert (status, err) == (2, "mauve: --overhead-ns: expected 0 or more, found -1\n")
+    status, out, _ = analyze(text, "--wakeup-us", "0", "--overhead-ns", "20000")
+    assert status == 1, "the slow one misses by what the releases cost"
+    assert "each release begins up to 0.000 ms late and costs 0.020 ms\n" in out
+
+
+def test_a_sender_above_a_component_is_part_of_its_response(analyze: Analyze) -> None:
+    sender = "sender: {priority: 35, cpus: [0]}"
+    text = PAIR.replace("overhead_ns: 0}", f"overhead_ns: 0, {sender}}}").replace("13950000", "10000000") + (
+        "resources:\n  count: {kind: shared_data, type: std_msgs/msg/Float64, "
+        "topic: {name: count, direction: publish}}\n"
+        "connections:\n  - [quick.count, count.write]\n"
+    )
+    status, out, _ = analyze(text)
+    assert status == 3
+    assert (
+        "  topics_out: its time is not declared: declare wcet_ns and min_interarrival_ns of executor." in out
+    )
+    assert "  quick: " not in out, "it is above the sender"
+    declared = text.replace("cpus: [0]}}", "cpus: [0], wcet_ns: 400000, min_interarrival_ns: 10000000}}", 1)
+    status, out, _ = analyze(declared)
+    assert status == 0
+    assert "thread 'topics_out': CPU 0, priority 35, 0.400 ms, declared every 10.000 ms\n" in out
+    assert "  response at most 17.600 ms, its deadline of 20.000 ms is met\n" in out
+    assert analyze(text.replace("priority: 35", "priority: 10"))[0] == 0
+
+
+def test_a_preempted_state_is_faulted_in_the_witness(analyze: Analyze, tmp_path: Path) -> None:
+    text = PAIR.replace("wcet_ns: 13950000", "wcet_ns: 10000000, max_execution_ns: 11000000")
+    bag = tmp_path / "witness"
+    status, out, _ = analyze(text, "--witness", str(bag))
+    assert status == 1
+    assert "  Count: 10.000 ms, declared, faulted above 11.000 ms\n" in out
+    assert "thread 'watchdog': any CPU, priority 99, 0.022 ms, declared every 1.000 ms\n" in out
+    assert "not schedulable: slow is faulted: Count lasts 13." in out
+    assert main(["trace", "check", str(bag)]) == 0
+    longer = text.replace("max_execution_ns: 11000000", "max_execution_ns: 17000000")
+    assert analyze(longer)[0] == 0
+
+
+def recorded(folder: Path, *, quick_ns: int) -> Path:
+    source = SyntheticSource(["quick", "slow"])
+    for component, took_ns in (("quick", quick_ns), ("slow", 5_000_000)):
+        deploy(source, component)
+        instant_ns = EPOCH_NS
+        for _ in range(3):
+            instant_ns = source.cycle(
+                component, instant_ns, states={"Count": took_ns}, wait_ns=20 * MS, wakeup_ns=0
+            )
+    return record(source, folder)
+
+
+def test_with_measured_times_a_verdict_is_a_forecast(analyze: Analyze, tmp_path: Path) -> None:
+    bag = recorded(tmp_path / "bag", quick_ns=2_000_000)
+    text = PAIR.replace(", states: {Count: {wcet_ns: 13950000}}", "")
+    status, out, _ = analyze(text, "--budget-from", str(bag), "--wakeup-us", "1000")
+    assert status == 4, out
+    assert (
+        "\nforecast: every component meets its deadline, if no time of slow is above the measured one, and\n"
+    ) in out
+
+
+def test_a_bag_that_shows_more_than_the_bounds_refutes_the_model(analyze: Analyze, tmp_path: Path) -> None:
+    bag = recorded(tmp_path / "bag", quick_ns=4_000_000)
+    status, out, _ = analyze(PAIR, "--budget-from", str(bag))
+    assert status == 5, out
+    assert "model refuted: quick took " in out
+    assert ", and its bound is 3.000 ms: " in out

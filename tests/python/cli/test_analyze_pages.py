@@ -35,7 +35,11 @@ def test_the_pieces_of_files_are_accepted(tmp_path: Path) -> None:
     file = tmp_path / "robot.yaml"
     pieces = [block.text for block in BLOCKS if block.language == "yaml"]
     for piece in pieces:
-        parts = piece.replace("...", "shell: a/A, core: a/A, fsm: a/A")
-        file.write_text(f"mauve: 1\ncomponents:\n  {parts}", encoding="utf-8")
+        control = "control: {shell: a/A, core: a/A, fsm: a/A}\n"
+        if piece.startswith("executor:"):
+            file.write_text(f"mauve: 1\n{piece}components:\n  {control}", encoding="utf-8")
+        else:
+            parts = piece.replace("...", "shell: a/A, core: a/A, fsm: a/A")
+            file.write_text(f"mauve: 1\ncomponents:\n  {parts}", encoding="utf-8")
         assert [*load_architecture(file).components] == ["control"]
-    assert len(pieces) == 2
+    assert len(pieces) == 3

@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[3]
 GUIDANCE = ROOT / "tests/python/modelling/guidance.yaml"
 ROBOT = """\
 mauve: 1
+executor: {{wakeup_us: 0, overhead_ns: 0}}
 components:
   guidance:
     shell: my_robot/GuidanceShell

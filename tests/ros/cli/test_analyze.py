@@ -12,6 +12,8 @@ from typing import Any
 
 from std_msgs.msg import Float64
 
+from mauve_msgs.srv import ListTasks
+
 NODE = "/robot_1/executor"
 MARGIN = 1.5
 NOT_PROVED = 3
@@ -28,12 +30,13 @@ SAME = (
 )
 
 
-def test_a_file_a_node_and_a_bag_tell_one_model(
+def test_a_file_a_node_and_a_bag_tell_one_model(  # noqa: PLR0915 - one executor for all three
     architecture: Path, start_executor: Callable[..., Any], graph: Any, domain: int, tmp_path: Path
 ) -> None:
     text = architecture.read_text(encoding="utf-8")
     declared = "counter: {deadline_ns: 7000000, states: {Count: {wcet_ns: 900000000}}, "
     text = text.replace("counter: {", declared, 1)
+    text = text.replace("executor: {", "executor: {wakeup_us: 70, overhead_ns: 9000, ", 1)
     text = text.replace("[counter.set, set.read]", "[counter.set, set.read]\n  - [guard.set, set.read]")
     ring = "set: {kind: ring_buffer, capacity: 8, longest_hold_ns: 30000, "  # two readers: with a lock
     text = text.replace("set: {kind: shared_data, ", ring)
@@ -43,6 +46,8 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     counts = graph.hear(Float64, "/robot_1/count")
     graph.spin_until(lambda: len(counts) > 20, "counts")
 
+    threads: dict[str, Any] = {}
+
     def analyzed(*words: str) -> dict[str, Any]:
         command = [sys.executable, "-m", "mauve_rt.cli", "analyze", *words, "--json"]
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
@@ -50,11 +55,15 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
             command, env=environment, capture_output=True, text=True, check=False, timeout=200
         )
         assert (done.returncode, done.stderr) == (NOT_PROVED, ""), "no component has a CPU of its own"
-        return {component["name"]: component for component in json.loads(done.stdout)["components"]}
+        told = json.loads(done.stdout)
+        threads[words[0]] = told["threads"]
+        assert (told["wakeup_ns"], told["overhead_ns"]) == (70_000, 9_000)
+        return {component["name"]: component for component in told["components"]}
 
     of_node = analyzed(NODE)
     assert executor.end(signal.SIGTERM)[0] == 0
     of_file, of_bag = analyzed(str(architecture)), analyzed(str(bag))
+    assert threads[NODE] == threads[str(bag)] == threads[str(architecture)]
     assert [*of_file] == [*of_node] == [*of_bag] == ["counter", "guard", "sleepy"]
     for name, told in of_file.items():
         for other in (of_node[name], of_bag[name]):
@@ -63,8 +72,9 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
         assert told["period_ns"] > 0
     assert of_file["counter"]["deadline_ns"] == 7_000_000
     assert of_file["counter"]["states"][0]["origin"] == "declared"
-    held = [{"resource": "set", "longest_ns": 30_000, "origin": "declared"}]
-    assert of_file["counter"]["holds"] == of_file["guard"]["holds"] == held
+    (held,) = of_file["counter"]["holds"]
+    assert (held["resource"], held["longest_ns"], held["origin"]) == ("set", 30_000, "declared")
+    assert of_file["guard"]["holds"] == [held]
     assert of_file["counter"]["undeclared_locks"] == [], "the only writer of count takes no lock"
 
     measured = analyzed(str(architecture), "--budget-from", str(bag), "--margin", str(MARGIN))
@@ -73,7 +83,7 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     assert state["origin"].startswith("measured in bag (n = ")
     assert state["origin"].endswith(f" x {MARGIN:g}")
     assert state["time_ns"] > 0
-    assert {job["cost_ns"] for job in measured["guard"]["jobs"]} == {state["time_ns"]}
+    assert {job["cost_ns"] for job in measured["guard"]["jobs"]} == {state["time_ns"] + 9_000}
 
     before = architecture.read_text(encoding="utf-8")
     command = [sys.executable, "-m", "mauve_rt.cli", "analyze", str(architecture)]
@@ -87,3 +97,28 @@ def test_a_file_a_node_and_a_bag_tell_one_model(
     assert re.sub(r"states: \{Count: \{wcet_ns: \d+\}\},  # measured.*\n *", "", after) == before
     written = analyzed(str(architecture))
     assert written["guard"]["states"] == [{**state, "origin": "declared"}]
+
+
+def test_the_list_of_threads_is_the_one_that_runs(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any, domain: int
+) -> None:
+    """The kernel of the computer says which threads of the executor run under SCHED_FIFO."""
+    executor = start_executor("-p", f"architecture:={architecture}")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "counts")
+    reply = graph.ask(ListTasks, f"{NODE}/list_tasks")
+    listed = {task.name: task.priority for task in reply.list.tasks}
+    assert (reply.list.wakeup_ns, reply.list.overhead_ns) == (-1, -1)
+    assert listed["topics_out"] + 1 == listed["stops_out"]
+    assert listed["trace"] == 1
+    components = {"counter", "guard", "sleepy"}
+    silent = ("safe outputs", "watchdog", "commit ", "reserve ")  # no state has a bound here
+    for task in Path(f"/proc/{executor.process.pid}/task").iterdir():
+        try:
+            policy, priority = os.sched_getscheduler(int(task.name)), os.sched_getparam(int(task.name))
+            name = (task / "comm").read_text(encoding="utf-8").rstrip("\n")
+        except OSError:  # the thread has ended
+            continue
+        if policy != os.SCHED_FIFO or name in components or name.startswith(silent):
+            continue
+        assert listed.get(name) == priority.sched_priority, name

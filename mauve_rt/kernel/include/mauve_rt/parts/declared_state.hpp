@@ -9,7 +9,7 @@
 
 namespace mauve {
 
-/// The times of an execution state. What is empty stays as the fsm says.
+/// The times of an execution state, or of the guards of a wait (wcet_ns alone). What is empty stays as the fsm says.
 struct DeclaredState {
   std::string name{};
   std::optional<time_ns_t> max_execution_ns{};        // the bound that the watchdog enforces; > 0

@@ -117,7 +117,7 @@ struct State {
   std::size_t action{kNone};            // of an execution state
   time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
   time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
-  time_ns_t wcet_ns{0};  // its worst-case execution time, for the timing analysis; 0: not declared
+  time_ns_t wcet_ns{0};  // its worst case, of a wait that of its guards, for the timing analysis; 0: not declared
   std::vector<Transition> transitions;  // the first whose guard holds is taken; of a wait, when it has ended
   State* next{nullptr};                 // otherwise this one
   std::uint32_t trace_id{0};
@@ -136,7 +136,7 @@ struct DescribedState {
   time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
   std::vector<std::string>
       successors{};      // in the order in which guards are asked; last the one without a guard
-  time_ns_t wcet_ns{0};  // of an execution state: its worst case; 0: not declared
+  time_ns_t wcet_ns{0};  // its worst case; of a wait that of its guards; 0: not declared
   // The expressions of the two times above: `5 * unit_ms`; empty: a plain number of ns.
   std::string duration_text{};
   std::string min_interarrival_text{};
@@ -147,8 +147,8 @@ struct DescribedState {
   std::vector<std::string> methods_without_wcet{};  // of a core that declares times of others: wcet_ns is 0
 };
 
-/// Gives each execution state without a worst case the core's: the times of its action and of the guards that are asked after
-/// it. Where the core declares none of one of these methods, the state keeps none. `core`: its name. [non-rt]
+/// Gives each state without a worst case the core's: the times of its action, which a wait lacks, and of the guards that are
+/// asked after it. Where the core declares none of one of these methods, the state keeps none. `core`: its name. [non-rt]
 void add_core_times(std::vector<DescribedState>& states, const std::string& core, const CoreTimes& times);
 
 /// An fsm seen without its types.
