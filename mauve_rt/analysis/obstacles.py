@@ -6,8 +6,8 @@ from pathlib import Path
 from mauve_rt.analysis.locks import named_twice
 from mauve_rt.analysis.machines import Machine, in_ms
 
-_RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
-_CPU = Path("/proc/cpuinfo")
+_ROOT = Path("/")
+_NOT_THROTTLED = -1
 
 
 def obstacles(machine: Machine, others: Sequence[Machine] = ()) -> Iterator[str]:
@@ -54,20 +54,30 @@ def assumptions_about(
     for machine in machines:
         if machine.clients:
             yield f"wcet_ns of {machine.name} has its waits for services in it ({', '.join(machine.clients)})"
-    runtime = _RUNTIME.read_text("ascii").strip() if _RUNTIME.exists() else "-1"
-    if runtime != "-1":
+    if (runtime := runtime_us()) != _NOT_THROTTLED:
         yield (
             f"components leave the rest of {runtime} us in each s, to which real-time threads are throttled "
             "(kernel.sched_rt_runtime_us: -1 switches that off)"
         )
-    words = _CPU.read_text("utf-8", "replace").split() if _CPU.exists() else []
-    if "hypervisor" in words:
+    if is_virtual():
         yield "the host of this virtual machine takes no CPU from it"
     yield "these threads of the executor take next to no time:"
     yield "- watchdog (99) and safe outputs (98), when a state lasts beyond its bound"
     yield "- rules (97), when an executor's rule looks or acts"
     yield f"- sender ({sender_priority}), which sends the messages of bound topics"
     yield "- trace (1), which collects records"
+
+
+def runtime_us(root: Path = _ROOT) -> int:
+    """The time in each second that the kernel gives to real-time threads, in us; -1: it does not limit them."""
+    file = root / "proc/sys/kernel/sched_rt_runtime_us"
+    return int(file.read_text("ascii")) if file.exists() else _NOT_THROTTLED
+
+
+def is_virtual(root: Path = _ROOT) -> bool:
+    """Whether the computer is a virtual machine, by the flags of its CPUs."""
+    file = root / "proc/cpuinfo"
+    return file.exists() and "hypervisor" in file.read_text("utf-8", "replace").split()
 
 
 def _about_locks(machines: Sequence[Machine]) -> Iterator[str]:

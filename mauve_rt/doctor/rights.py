@@ -1,0 +1,40 @@
+"""The real-time rights of this shell: asked for as an executor asks for them."""
+
+import resource
+from collections.abc import Iterator, Sequence
+
+from mauve_rt.doctor.finding import Computer, Finding, ok, warning
+
+_PAGE = "docs/howto/realtime_rights.md"
+_COST = "an executor started from this shell runs without this right"
+_LIMITS = {"rtprio": resource.RLIMIT_RTPRIO, "memlock": resource.RLIMIT_MEMLOCK}
+
+
+def missing_rights() -> list[str]:
+    """One line for each right that the system denies this process: right, effect, how to grant it."""
+    from mauve_rt._kernel import Architecture, Deployer, PluginRegistry  # noqa: PLC0415 - takes its time to load
+
+    deployer = Deployer(Architecture(PluginRegistry()), trace=False)
+    deployer.prepare_process()
+    return list(deployer.realtime_status().missing)
+
+
+def check_rights(_computer: Computer) -> Iterator[Finding]:
+    """SCHED_FIFO, locked memory and /dev/cpu_dma_latency, with the limits of this shell."""
+    yield from describe_rights(missing_rights(), limits())
+
+
+def describe_rights(missing: Sequence[str], limits: str) -> Iterator[Finding]:
+    """What is denied, in the words of the kernel of MAUVE RT."""
+    if not missing:
+        yield ok(f"all granted; limits: {limits}")
+    for line in missing:
+        yield warning(line, cost=_COST, remedy=_PAGE)
+
+
+def limits() -> str:
+    """The limits of this process that rights depend on."""
+    found = {name: resource.getrlimit(which)[0] for name, which in _LIMITS.items()}
+    return ", ".join(
+        f"{name} {'unlimited' if limit == resource.RLIM_INFINITY else limit}" for name, limit in found.items()
+    )

@@ -1,0 +1,192 @@
+"""The wake-up test: how late the threads of a periodic native component start, on each CPU, and what one activation costs.
+
+It runs an architecture by the executor's own path: one basic element in C++ (a relay of a number) a CPU, pinned, at 1 kHz, and
+reads the trace records of its releases.
+"""
+
+import os
+import time
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from mauve_rt.doctor.finding import Finding, ok, warning
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    Numbers = npt.NDArray[np.int64]
+
+PRIORITY = 95
+_ELEMENT = "mauve_rt/Float64Relay"
+_PERIOD_US = 1000
+_SETTLE = 20  # releases left out: caches are cold
+_DRAIN_NS, _LOOK_S = 100_000_000, 0.25
+_NOTABLE_US = 1000.0  # one period of the fastest usual control loop
+_EDGES_US = (5, 10, 20, 50, 100, 200, 500, 1000, 2000, 5000, 10000)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CpuWakeup:
+    """The wake-up latencies on one CPU."""
+
+    cpu: int
+    policy: str
+    count: int
+    min_us: float
+    median_us: float
+    p999_us: float
+    max_us: float
+    histogram: list[tuple[float | None, int]]
+    """(upper edge in us, or None for above all; how many latencies are below it and not below the one before)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wakeup:
+    """The outcome of the test."""
+
+    seconds: float
+    period_us: int = _PERIOD_US
+    priority: int = PRIORITY
+    cpus: list[CpuWakeup] = field(default_factory=list)
+    wakeup_us: float
+    """The longest latency of all CPUs."""
+    overhead_ns: int
+    """The longest time of the kernel of MAUVE RT in one activation, with the trace, of all CPUs: from the first instruction
+    after the wake-up to the next wait, without the execution of the component's state."""
+    overhead_median_ns: int
+
+    @property
+    def is_fifo(self) -> bool:
+        """Whether every thread had real-time rights."""
+        return all(each.policy == "SCHED_FIFO" for each in self.cpus)
+
+
+def measure(seconds: float, cpus: Sequence[int] = ()) -> Wakeup:
+    """Run the test on these CPUs, or on all that this process may use.
+
+    Raises:
+        MauveError: the basic elements are not installed, or a thread cannot be made.
+    """
+    import numpy as np  # noqa: PLC0415 - takes its time to load
+
+    from mauve_rt._kernel import Architecture, Deployer, PluginRegistry  # noqa: PLC0415
+    from mauve_rt.model.plugins import PluginIndex, PluginLoader  # noqa: PLC0415
+    from mauve_rt.trace.format.records import RECORD  # noqa: PLC0415
+
+    on = list(cpus) or sorted(os.sched_getaffinity(0))
+    registry = PluginRegistry()
+    loader = PluginLoader(registry, PluginIndex.installed())
+    for kind, name in (("shell", f"{_ELEMENT}Shell"), ("core", _ELEMENT), ("fsm", f"{_ELEMENT}Fsm")):
+        loader.require(kind, name)
+    architecture = Architecture(registry)
+    for cpu in on:
+        name = f"cpu_{cpu}"
+        architecture.add_component(
+            name, f"{_ELEMENT}Shell", _ELEMENT, f"{_ELEMENT}Fsm", priority=PRIORITY, cpus=[cpu]
+        )
+        architecture.set_property(name, "period_us", _PERIOD_US)
+        for side, (port, service) in enumerate((("input", "read"), ("output", "write"))):
+            architecture.add_resource(f"{name}_{side}", kind="shared_data", type="std_msgs/msg/Float64")
+            architecture.connect(name, port, f"{name}_{side}", service)
+    architecture.configure()
+    deployer = Deployer(architecture)
+    deployer.collect_trace(_DRAIN_NS)
+    drained: list[bytes] = []
+    deployer.deploy()
+    try:
+        policies = {each.name: each.policy for each in deployer.describe()}
+        until_s = time.monotonic() + seconds
+        while (left_s := until_s - time.monotonic()) > 0:
+            time.sleep(min(left_s, _LOOK_S))
+            drained.append(deployer.drain_trace().records)
+    finally:
+        deployer.shutdown()
+    drained.append(deployer.drain_trace().records)
+    records = np.frombuffer(b"".join(drained), RECORD)
+    numbers = {name: number for number, name in enumerate(deployer.trace_components())}
+    return _of_records(
+        seconds, {cpu: (records[records["component"] == numbers[f"cpu_{cpu}"]], policies[f"cpu_{cpu}"]) for cpu in on}
+    )
+
+
+def describe(wakeup: Wakeup) -> Iterator[Finding]:
+    """The test as one line of the report."""
+    found = f"longest {wakeup.wakeup_us:.0f} us at 1 kHz in {wakeup.seconds:g} s on {len(wakeup.cpus)} CPUs"
+    if not wakeup.is_fifo:
+        yield warning(
+            f"{found}, as SCHED_OTHER",
+            cost="the figure says nothing about components with real-time rights",
+            remedy="docs/howto/realtime_rights.md",
+        )
+    elif wakeup.wakeup_us > _NOTABLE_US:
+        yield warning(
+            found,
+            cost="a component can miss a release of a period of this length",
+            remedy="docs/howto/pin_and_isolate_cpus.md, and measure again under the worst load",
+        )
+    else:
+        yield ok(found)
+
+
+def _of_records(seconds: float, by_cpu: dict[int, tuple[Any, str]]) -> Wakeup:
+    import numpy as np  # noqa: PLC0415
+
+    cpus, overheads = [], []
+    for cpu, (records, policy) in by_cpu.items():
+        latencies, overhead = _latencies_ns(records), _overheads_ns(records)
+        if latencies.size:
+            cpus.append(_statistics(cpu, policy, latencies / 1e3))
+        overheads.append(overhead)
+    every = np.concatenate(overheads)
+    return Wakeup(
+        seconds=seconds,
+        cpus=cpus,
+        wakeup_us=max((each.max_us for each in cpus), default=0.0),
+        overhead_ns=int(every.max(initial=0)),
+        overhead_median_ns=int(np.median(every)) if every.size else 0,
+    )
+
+
+def _latencies_ns(records: Any) -> "Numbers":
+    from mauve_rt.trace.format.records import Kind  # noqa: PLC0415
+
+    releases = records[records["kind"] == Kind.RELEASE][_SETTLE:]
+    latencies: Numbers = releases["b"] - releases["a"]
+    return latencies
+
+
+def _overheads_ns(records: Any) -> "Numbers":
+    """Of each activation that is whole: RELEASE, STATE_BEGIN, STATE_END, WAIT."""
+    import numpy as np  # noqa: PLC0415
+
+    from mauve_rt.trace.format.records import Kind  # noqa: PLC0415
+
+    kinds = records["kind"]
+    pattern = (Kind.RELEASE, Kind.STATE_BEGIN, Kind.STATE_END, Kind.WAIT)
+    last = max(len(kinds) - len(pattern) + 1, 0)
+    is_whole = np.ones(last, dtype=bool)
+    for place, kind in enumerate(pattern):
+        is_whole &= kinds[place : place + last] == kind
+    begins = np.flatnonzero(is_whole)[_SETTLE:]
+    times = records["time_ns"]
+    overheads: Numbers = times[begins + 3] - records["b"][begins] - (times[begins + 2] - times[begins + 1])
+    return overheads
+
+
+def _statistics(cpu: int, policy: str, latencies_us: Any) -> CpuWakeup:
+    import numpy as np  # noqa: PLC0415
+
+    least, median, p999, most = (float(np.percentile(latencies_us, each)) for each in (0, 50, 99.9, 100))
+    counts = np.bincount(np.searchsorted(_EDGES_US, latencies_us, side="right"), minlength=len(_EDGES_US) + 1)
+    return CpuWakeup(
+        cpu=cpu,
+        policy=policy,
+        count=len(latencies_us),
+        min_us=least,
+        median_us=median,
+        p999_us=p999,
+        max_us=most,
+        histogram=[(edge, int(count)) for edge, count in zip((*_EDGES_US, None), counts, strict=True)],
+    )
