@@ -62,12 +62,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMPONENT.STATE=TIME",
         help="assume this time of a state, e.g. guidance.Planning=20ms; may be repeated",
     )
-    parser.add_argument(
+    wakeup = parser.add_mutually_exclusive_group()
+    wakeup.add_argument(
         "--wakeup-us",
         type=float,
         default=0.0,
         metavar="X",
         help="longest time from an instant to the start of its thread, in us (default 0)",
+    )
+    wakeup.add_argument(
+        "--doctor",
+        type=Path,
+        metavar="JSON",
+        help="take --wakeup-us from this output of `mauve doctor --json`",
     )
     parser.add_argument(
         "--witness",
@@ -92,6 +99,7 @@ def main(args: argparse.Namespace) -> int:
     if not math.isfinite(args.wakeup_us) or args.wakeup_us < 0:
         print(f"mauve: --wakeup-us: expected 0 or more, found {args.wakeup_us:g}", file=sys.stderr)
         return BAD_USAGE
+    wakeup_us = args.wakeup_us if args.doctor is None else _measured_wakeup_us(args.doctor)
     if args.write and (args.budget_from is None or not Path(args.target).is_file()):
         print("mauve: --write: expected an architecture FILE and --budget-from BAG", file=sys.stderr)
         return BAD_USAGE
@@ -103,11 +111,11 @@ def main(args: argparse.Namespace) -> int:
         if args.write:
             _write(Path(args.target), declared, machines)
     machines = with_supposed(machines, args.suppose)
-    wakeup_ns = round(args.wakeup_us * 1e3)
+    wakeup_ns = round(wakeup_us * 1e3)
     subjects = [Subject.of(machine, machines) for machine in machines]
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
     verdict = judge(subjects, bounds, wakeup_ns=wakeup_ns)
-    assumptions = [*assumptions_about(machines, wakeup_us=args.wakeup_us, sender_priority=sender_priority)]
+    assumptions = [*assumptions_about(machines, wakeup_us=wakeup_us, sender_priority=sender_priority)]
     assumptions += [
         f"the parts of {path} are written in C++, but for implementations with a module"
         for path in args.model
@@ -128,6 +136,27 @@ def main(args: argparse.Namespace) -> int:
         print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
     statuses = {Outcome.SCHEDULABLE: OK, Outcome.NOT_SCHEDULABLE: REFUSED}
     return statuses.get(verdict.outcome, NOT_PROVED)
+
+
+def _measured_wakeup_us(path: Path) -> float:
+    """The longest wake-up latency that `mauve doctor --json` measured.
+
+    Raises:
+        ParameterError: the file has none.
+    """
+    from mauve_rt.errors import ParameterError, exception_text  # noqa: PLC0415
+
+    try:
+        found = json.loads(path.read_text("utf-8"))
+        measured = found["wakeup"]["wakeup_us"]
+        if not math.isfinite(measured) or measured < 0:
+            raise ValueError(f"wakeup_us is {measured:g}")
+    except OSError as error:
+        raise ParameterError(f"--doctor: {path}: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        remedy = "write it with `mauve doctor --json`, without --seconds 0"
+        raise ParameterError(f"--doctor: {path} has no wake-up latency ({exception_text(error)}); {remedy}") from None
+    return float(measured)
 
 
 def _machines(target: str, models: Sequence[Path]) -> "tuple[list[Machine], int]":

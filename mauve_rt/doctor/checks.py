@@ -69,7 +69,7 @@ def _examine(check: Check, computer: Computer, into: list[Finding]) -> None:
     except Exception as problem:  # noqa: BLE001 - what cannot be read is a finding
         into.append(
             warning(
-                f"cannot read: {exception_text(problem)}",
+                f"cannot examine: {exception_text(problem)}",
                 cost="this check does not know",
                 remedy="run `mauve doctor` as a user who may read the file",
             )

@@ -1,7 +1,7 @@
-"""The wake-up test: how late the threads of a periodic native component start, on each CPU, and what one activation costs.
+"""The wake-up test: how late a thread starts on each CPU, and what one activation costs.
 
-It runs an architecture by the executor's own path: one basic element in C++ (a relay of a number) a CPU, pinned, at 1 kHz, and
-reads the trace records of its releases.
+It runs an architecture as an executor does: on each CPU one basic element in C++ (a relay of a number) at
+1 kHz. The trace records of its releases have the latencies.
 """
 
 import os
@@ -53,8 +53,10 @@ class Wakeup:
     wakeup_us: float
     """The longest latency of all CPUs."""
     overhead_ns: int
-    """The longest time of the kernel of MAUVE RT in one activation, with the trace, of all CPUs: from the first instruction
-    after the wake-up to the next wait, without the execution of the component's state."""
+    """The longest time of MAUVE RT in one activation, with the trace, of all CPUs.
+
+    From the first instruction after the wake-up to the next wait, without the execution of the state.
+    """
     overhead_median_ns: int
 
     @property
@@ -128,6 +130,15 @@ def describe(wakeup: Wakeup) -> Iterator[Finding]:
         )
     else:
         yield ok(found)
+
+
+def describe_missing(problem: str) -> Finding:
+    """A test that could not be carried out."""
+    return warning(
+        problem,
+        cost="the wake-up latency of this computer is not measured",
+        remedy="scripts/setup installs the basic elements that the test runs",
+    )
 
 
 def _of_records(seconds: float, by_cpu: dict[int, tuple[Any, str]]) -> Wakeup:
