@@ -138,8 +138,8 @@ def main(args: argparse.Namespace) -> int:
     return statuses.get(verdict.outcome, NOT_PROVED)
 
 
-def _measured_wakeup_us(path: Path) -> float:
-    """The longest wake-up latency that `mauve doctor --json` measured.
+def _measured_wakeup_us(path: Path) -> int:
+    """The longest wake-up latency that `mauve doctor --json` measured, rounded up.
 
     Raises:
         ParameterError: the file has none.
@@ -156,7 +156,7 @@ def _measured_wakeup_us(path: Path) -> float:
     except (ValueError, KeyError, TypeError) as error:
         remedy = "write it with `mauve doctor --json`, without --seconds 0"
         raise ParameterError(f"--doctor: {path} has no wake-up latency ({exception_text(error)}); {remedy}") from None
-    return float(measured)
+    return math.ceil(measured)
 
 
 def _machines(target: str, models: Sequence[Path]) -> "tuple[list[Machine], int]":

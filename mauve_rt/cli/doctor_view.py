@@ -41,8 +41,9 @@ def print_wakeup(wakeup: Wakeup) -> None:
         out.print(f"\n[bold]CPU {cpu.cpu}[/] {cpu.policy}: {figures} us, {cpu.count:,} wake-ups", soft_wrap=True)
         for line in _bars(cpu):
             out.print(line, soft_wrap=True)
-    overhead = f"{wakeup.overhead_median_ns / 1e3:.1f} us, the longest {wakeup.overhead_ns / 1e3:.1f} us"
-    out.print(f"\nMAUVE RT itself takes {overhead} of an activation, with the trace.", soft_wrap=True)
+    if wakeup.overhead_ns is not None:
+        cost = f"{wakeup.overhead_ns / 1e3:.1f} us of CPU time on average"
+        out.print(f"\nA release takes {cost}, with its wake-up and its wait.", soft_wrap=True)
 
 
 def print_summary(findings: Sequence[Finding]) -> None:

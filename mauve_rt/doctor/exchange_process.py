@@ -1,8 +1,10 @@
 """Sends a message again and again, or receives one: `send|receive TOPIC SECONDS`.
 
-The receiver prints the seconds from its start to the message; it ends with status 1 where none came.
+The receiver prints the seconds from its start to the message; it ends with status 1 where none came. The
+sender ends by SIGTERM.
 """
 
+import signal
 import sys
 import time
 from typing import Any
@@ -24,19 +26,22 @@ def main() -> int:
         return 2
     import rclpy  # noqa: PLC0415 - reads the environment
     from rclpy.node import Node  # noqa: PLC0415
+    from rclpy.signals import SignalHandlerOptions  # noqa: PLC0415
     from std_msgs.msg import Empty  # noqa: PLC0415
 
     from mauve_rt.node.shared.announcement import first_participant  # noqa: PLC0415
 
     received: list[Any] = []
+    ended: list[Any] = []
+    signal.signal(signal.SIGTERM, lambda *_: ended.append(True))
     with first_participant():
-        rclpy.init(args=list(NO_LOG_FILES))
+        rclpy.init(args=list(NO_LOG_FILES), signal_handler_options=SignalHandlerOptions.NO)
         node = Node(topic[1:] + "_" + role, enable_rosout=False, start_parameter_services=False)
     if role == "send":
         publisher = node.create_publisher(Empty, topic, 1)
     else:
         node.create_subscription(Empty, topic, received.append, 1)
-    while not received and time.monotonic() < begun_s + float(seconds):
+    while not received and not ended and time.monotonic() < begun_s + float(seconds):
         if role == "send":
             publisher.publish(Empty())
             time.sleep(_EVERY_S)

@@ -6,7 +6,6 @@ from typing import Any
 from mauve_rt.counts import counted
 from mauve_rt.doctor.finding import Finding, error, ok, warning
 
-_STATES = ("fault", "hung")
 _FAULTED = 5  # of mauve_msgs/msg/ComponentInfo
 
 
@@ -52,9 +51,9 @@ def describe_executor(reply: Any, denied_here: Sequence[str]) -> Iterator[Findin
     yield ok(f"{count}, revision {reply.revision}, {granted}")
 
 
-def describe_unreached(problem: str) -> Iterator[Finding]:
+def describe_unreached(problem: str) -> Finding:
     """An executor that does not answer."""
-    yield error(
+    return error(
         problem,
         cost="mauve and supervisors do not reach this executor",
         remedy="start it, in the ROS_DOMAIN_ID of this shell; `mauve nodes` lists those that answer",

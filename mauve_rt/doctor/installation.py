@@ -38,7 +38,13 @@ def check_plugin_index(_computer: Computer) -> Iterator[Finding]:
             cost="an executor whose architecture names one of them does not start",
             remedy=_REBUILD,
         )
-    if not index.complaints and not missing:
+    if not plugins:
+        yield error(
+            "no package lists plug-ins",
+            cost="no architecture starts: its shells, cores and fsms are not found",
+            remedy=f"source {native_prefix()}/setup.bash",
+        )
+    elif not index.complaints and not missing:
         packages = {plugin.name.partition("/")[0] for plugin in plugins}
         yield ok(f"{counted(len(plugins), 'plug-in')} of {counted(len(packages), 'package')}")
 

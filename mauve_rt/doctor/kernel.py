@@ -135,9 +135,7 @@ def check_cpu_quota(computer: Computer) -> Iterator[Finding]:
             cost="when the quota is used up, all threads of the group stop until the next period",
             remedy="remove CPUQuota= from the unit, or --cpus from the container's command line",
         )
-    elif computer.path("/sys/fs/cgroup/cpu/cpu.rt_runtime_us").exists() and any(
-        _text(computer, f"{folder}/cpu.rt_runtime_us") == "0" for folder in _folders(computer, "cpu")
-    ):
+    elif any(_text(computer, f"{folder}/cpu.rt_runtime_us") == "0" for folder in _folders(computer, "cpu")):
         yield error(
             "the cgroup of this shell has no real-time CPU time (cpu.rt_runtime_us is 0)",
             cost="the kernel refuses SCHED_FIFO to all programs of the group",

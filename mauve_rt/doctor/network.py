@@ -18,7 +18,7 @@ from mauve_rt.node.shared.rtps_ports import participants_by_domain
 _DISTRIBUTION = "jazzy"
 _PAGE = "docs/several_machines.md"
 _PROGRAM = "mauve_rt.doctor.exchange_process"
-EXCHANGE_S = 15.0
+EXCHANGE_S, _END_S = 15.0, 5.0
 
 
 def check_distribution(_computer: Computer) -> Iterator[Finding]:
@@ -116,9 +116,18 @@ def exchange(limit_s: float) -> tuple[int, str, str]:
     except subprocess.TimeoutExpired:
         return 1, "", "the receiver hangs"
     finally:
+        _end(sender)
+    return done.returncode, done.stdout, (done.stderr.strip().splitlines() or [""])[-1]
+
+
+def _end(sender: "subprocess.Popen[bytes]") -> None:
+    """Let it remove its shared memory."""
+    sender.terminate()
+    try:
+        sender.wait(_END_S)
+    except subprocess.TimeoutExpired:
         sender.kill()
         sender.wait()
-    return done.returncode, done.stdout, (done.stderr.strip().splitlines() or [""])[-1]
 
 
 def check_participants(computer: Computer) -> Iterator[Finding]:

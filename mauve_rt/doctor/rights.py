@@ -7,7 +7,7 @@ from mauve_rt.doctor.finding import Computer, Finding, ok, warning
 
 _PAGE = "docs/howto/realtime_rights.md"
 _COST = "an executor started from this shell runs without this right"
-_LIMITS = {"rtprio": resource.RLIMIT_RTPRIO, "memlock": resource.RLIMIT_MEMLOCK}
+_LIMITS = {"rtprio": (resource.RLIMIT_RTPRIO, ""), "memlock": (resource.RLIMIT_MEMLOCK, " bytes")}
 
 
 def missing_rights() -> list[str]:
@@ -34,7 +34,9 @@ def describe_rights(missing: Sequence[str], limits: str) -> Iterator[Finding]:
 
 def limits() -> str:
     """The limits of this process that rights depend on."""
-    found = {name: resource.getrlimit(which)[0] for name, which in _LIMITS.items()}
-    return ", ".join(
-        f"{name} {'unlimited' if limit == resource.RLIM_INFINITY else limit}" for name, limit in found.items()
-    )
+    return ", ".join(f"{name} {_limit(which)}{unit}" for name, (which, unit) in _LIMITS.items())
+
+
+def _limit(which: int) -> str:
+    limit, _ = resource.getrlimit(which)
+    return "unlimited" if limit == resource.RLIM_INFINITY else str(limit)

@@ -3,6 +3,7 @@
 import fcntl
 import os
 import re
+import shlex
 import shutil
 from collections.abc import Iterator
 from pathlib import Path
@@ -14,7 +15,7 @@ _MEMORY = "/dev/shm"  # noqa: S108 - Fast DDS's
 _LEAST_MEMORY, _LEAST_DISK = 64 << 20, 1 << 30
 _MARK = "_el"  # Fast DDS holds the lock of this file while the participant of the segment lives
 _PROFILE = re.compile(r"mauve_(\d+)_[0-9a-f]{16}\.xml")  # that an executor writes while it starts
-_NAMED = 3
+_BLOCK_BYTES = 512  # of st_blocks
 
 
 def check_shared_memory(computer: Computer) -> Iterator[Finding]:
@@ -63,13 +64,11 @@ def check_leftovers(computer: Computer) -> Iterator[Finding]:
     if not dead:
         yield ok(f"none{note}")
         return
-    size = sum(file.stat().st_blocks * 512 for file in dead if file.exists())
-    names = " ".join(str(file) for file in dead[:_NAMED])
-    rest = f" (and {len(dead) - _NAMED} more)" if len(dead) > _NAMED else ""
+    size = sum(file.stat().st_blocks * _BLOCK_BYTES for file in dead if file.exists())
     yield warning(
         f"{counted(len(dead), 'file')} of dead processes, {size / (1 << 20):.1f} MiB{note}",
         cost="memory or disk stays in use until the computer starts again",
-        remedy=f"rm {names}{rest}",
+        remedy=shlex.join(["rm", *map(str, dead)]),
     )
 
 

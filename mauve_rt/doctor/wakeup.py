@@ -7,16 +7,13 @@ It runs an architecture as an executor does: on each CPU one basic element in C+
 import os
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
+from mauve_rt.counts import counted
 from mauve_rt.doctor.finding import Finding, ok, warning
-
-if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
-    Numbers = npt.NDArray[np.int64]
 
 PRIORITY = 95
 _ELEMENT = "mauve_rt/Float64Relay"
@@ -52,12 +49,11 @@ class Wakeup:
     cpus: list[CpuWakeup] = field(default_factory=list)
     wakeup_us: float
     """The longest latency of all CPUs."""
-    overhead_ns: int
-    """The longest time of MAUVE RT in one activation, with the trace, of all CPUs.
+    overhead_ns: int | None
+    """The CPU time of one release of the element, on the CPU with the longest: a mean over the test.
 
-    From the first instruction after the wake-up to the next wait, without the execution of the state.
+    As Linux counts it: the wake-up, the activation with its trace, and the next wait. None: not known.
     """
-    overhead_median_ns: int
 
     @property
     def is_fifo(self) -> bool:
@@ -75,7 +71,7 @@ def measure(seconds: float, cpus: Sequence[int] = ()) -> Wakeup:
 
     from mauve_rt._kernel import Architecture, Deployer, PluginRegistry  # noqa: PLC0415
     from mauve_rt.model.plugins import PluginIndex, PluginLoader  # noqa: PLC0415
-    from mauve_rt.trace.format.records import RECORD  # noqa: PLC0415
+    from mauve_rt.trace.format.records import RECORD, Kind  # noqa: PLC0415
 
     on = list(cpus) or sorted(os.sched_getaffinity(0))
     registry = PluginRegistry()
@@ -96,26 +92,64 @@ def measure(seconds: float, cpus: Sequence[int] = ()) -> Wakeup:
     deployer = Deployer(architecture)
     deployer.collect_trace(_DRAIN_NS)
     drained: list[bytes] = []
+    readings: list[_Reading] = []
     deployer.deploy()
     try:
-        policies = {each.name: each.policy for each in deployer.describe()}
+        policies = {each.name: each.policy for each in architecture.components()}
         until_s = time.monotonic() + seconds
         while (left_s := until_s - time.monotonic()) > 0:
+            readings.append(_Reading.now())
             time.sleep(min(left_s, _LOOK_S))
             drained.append(deployer.drain_trace().records)
+        readings.append(_Reading.now())
     finally:
         deployer.shutdown()
     drained.append(deployer.drain_trace().records)
     records = np.frombuffer(b"".join(drained), RECORD)
     numbers = {name: number for number, name in enumerate(deployer.trace_components())}
-    return _of_records(
-        seconds, {cpu: (records[records["component"] == numbers[f"cpu_{cpu}"]], policies[f"cpu_{cpu}"]) for cpu in on}
+    cpus_found, costs_ns = [], []
+    for cpu in on:
+        name = f"cpu_{cpu}"
+        of_cpu = records[(records["component"] == numbers[name]) & (records["kind"] == Kind.RELEASE)]
+        latencies_us = (of_cpu["b"] - of_cpu["a"])[_SETTLE:] / 1e3
+        if latencies_us.size:
+            cpus_found.append(_statistics(cpu, policies[name], latencies_us))
+        costs_ns.append(_release_ns(name, of_cpu["b"], readings[0], readings[-1]))
+    return Wakeup(
+        seconds=seconds,
+        cpus=cpus_found,
+        wakeup_us=max((each.max_us for each in cpus_found), default=0.0),
+        overhead_ns=max((each for each in costs_ns if each is not None), default=None),
     )
+
+
+class _Reading(NamedTuple):
+    """The CPU time of each thread of this process by its name, at an instant of CLOCK_MONOTONIC."""
+
+    time_ns: int
+    spent_ns: dict[str, int]
+
+    @classmethod
+    def now(cls) -> "_Reading":
+        spent = {}
+        for thread in Path("/proc/self/task").iterdir():
+            with suppress(OSError):  # it has ended, or this kernel does not count
+                name = (thread / "comm").read_text("utf-8", "replace").strip()
+                spent[name] = int((thread / "schedstat").read_text("ascii").split()[0])
+        return cls(time.monotonic_ns(), spent)
+
+
+def _release_ns(name: str, releases: Any, first: _Reading, last: _Reading) -> int | None:
+    """The CPU time that a thread spent between two readings for each of its releases; None: not known."""
+    count = int(((releases >= first.time_ns) & (releases < last.time_ns)).sum())
+    if not count or name not in first.spent_ns or name not in last.spent_ns:
+        return None
+    return (last.spent_ns[name] - first.spent_ns[name]) // count
 
 
 def describe(wakeup: Wakeup) -> Iterator[Finding]:
     """The test as one line of the report."""
-    found = f"longest {wakeup.wakeup_us:.0f} us at 1 kHz in {wakeup.seconds:g} s on {len(wakeup.cpus)} CPUs"
+    found = f"longest {wakeup.wakeup_us:.0f} us at 1 kHz in {wakeup.seconds:g} s on {counted(len(wakeup.cpus), 'CPU')}"
     if not wakeup.is_fifo:
         yield warning(
             f"{found}, as SCHED_OTHER",
@@ -139,51 +173,6 @@ def describe_missing(problem: str) -> Finding:
         cost="the wake-up latency of this computer is not measured",
         remedy="scripts/setup installs the basic elements that the test runs",
     )
-
-
-def _of_records(seconds: float, by_cpu: dict[int, tuple[Any, str]]) -> Wakeup:
-    import numpy as np  # noqa: PLC0415
-
-    cpus, overheads = [], []
-    for cpu, (records, policy) in by_cpu.items():
-        latencies, overhead = _latencies_ns(records), _overheads_ns(records)
-        if latencies.size:
-            cpus.append(_statistics(cpu, policy, latencies / 1e3))
-        overheads.append(overhead)
-    every = np.concatenate(overheads)
-    return Wakeup(
-        seconds=seconds,
-        cpus=cpus,
-        wakeup_us=max((each.max_us for each in cpus), default=0.0),
-        overhead_ns=int(every.max(initial=0)),
-        overhead_median_ns=int(np.median(every)) if every.size else 0,
-    )
-
-
-def _latencies_ns(records: Any) -> "Numbers":
-    from mauve_rt.trace.format.records import Kind  # noqa: PLC0415
-
-    releases = records[records["kind"] == Kind.RELEASE][_SETTLE:]
-    latencies: Numbers = releases["b"] - releases["a"]
-    return latencies
-
-
-def _overheads_ns(records: Any) -> "Numbers":
-    """Of each activation that is whole: RELEASE, STATE_BEGIN, STATE_END, WAIT."""
-    import numpy as np  # noqa: PLC0415
-
-    from mauve_rt.trace.format.records import Kind  # noqa: PLC0415
-
-    kinds = records["kind"]
-    pattern = (Kind.RELEASE, Kind.STATE_BEGIN, Kind.STATE_END, Kind.WAIT)
-    last = max(len(kinds) - len(pattern) + 1, 0)
-    is_whole = np.ones(last, dtype=bool)
-    for place, kind in enumerate(pattern):
-        is_whole &= kinds[place : place + last] == kind
-    begins = np.flatnonzero(is_whole)[_SETTLE:]
-    times = records["time_ns"]
-    overheads: Numbers = times[begins + 3] - records["b"][begins] - (times[begins + 2] - times[begins + 1])
-    return overheads
 
 
 def _statistics(cpu: int, policy: str, latencies_us: Any) -> CpuWakeup:

@@ -361,6 +361,34 @@ def test_a_latency_that_cannot_be_is_refused(analyze: Analyze, latency: str) -> 
     assert "--wakeup-us: expected 0 or more" in err
 
 
+def test_the_wakeup_latency_is_the_longest_that_doctor_measured(analyze: Analyze, tmp_path: Path) -> None:
+    measured = tmp_path / "doctor.json"
+    measured.write_text('{"wakeup": {"wakeup_us": 49.2}}', encoding="utf-8")
+    status, out, _ = analyze(PAIR, "--doctor", str(measured))
+    assert "threads begin 50 us after their instants at the latest" in out
+    assert (status, out) == analyze(PAIR, "--wakeup-us", "50")[:2]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "has no wake-up latency"),
+        ('{"findings": [], "wakeup": null}', "without --seconds 0"),
+        ('{"wakeup": {"wakeup_us": -1}}', "wakeup_us is -1"),
+        ('{"wakeup": {"wakeup_us": "fast"}}', "has no wake-up latency"),
+        (None, "No such file"),
+    ],
+)
+def test_a_file_without_a_wakeup_latency_is_refused(
+    text: str | None, words: str, analyze: Analyze, tmp_path: Path
+) -> None:
+    file = tmp_path / "doctor.json"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    status, _, err = analyze(ROBOT, "--doctor", str(file))
+    assert (status, words in err, err.count("\n")) == (2, True, 1), err
+
+
 @pytest.mark.parametrize("margin", ["0.9", "nan", "-1"])
 def test_a_margin_below_one_is_refused(analyze: Analyze, margin: str) -> None:
     status, _, err = analyze(ROBOT, "--margin", margin)
