@@ -155,7 +155,9 @@ def _measured_wakeup_us(path: Path) -> int:
         raise ParameterError(f"--doctor: {path}: {error.strerror}") from None
     except (ValueError, KeyError, TypeError) as error:
         remedy = "write it with `mauve doctor --json`, without --seconds 0"
-        raise ParameterError(f"--doctor: {path} has no wake-up latency ({exception_text(error)}); {remedy}") from None
+        raise ParameterError(
+            f"--doctor: {path} has no wake-up latency ({exception_text(error)}); {remedy}"
+        ) from None
     return math.ceil(measured)
 
 

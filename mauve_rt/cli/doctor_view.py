@@ -38,7 +38,9 @@ def print_wakeup(wakeup: Wakeup) -> None:
                 ("max", cpu.max_us),
             )
         )
-        out.print(f"\n[bold]CPU {cpu.cpu}[/] {cpu.policy}: {figures} us, {cpu.count:,} wake-ups", soft_wrap=True)
+        out.print(
+            f"\n[bold]CPU {cpu.cpu}[/] {cpu.policy}: {figures} us, {cpu.count:,} wake-ups", soft_wrap=True
+        )
         for line in _bars(cpu):
             out.print(line, soft_wrap=True)
     if wakeup.overhead_ns is not None:

@@ -30,7 +30,9 @@ def describe_executor(reply: Any, denied_here: Sequence[str]) -> Iterator[Findin
     if others and not reply.realtime.missing:
         cost = "other programs delay these components"
         yield warning(f"not SCHED_FIFO: {', '.join(others)}", cost=cost, remedy=rights)
-    late = [f"{each.name} {each.overruns:,} of {each.releases:,}" for each in reply.components if each.overruns]
+    late = [
+        f"{each.name} {each.overruns:,} of {each.releases:,}" for each in reply.components if each.overruns
+    ]
     if late:
         yield warning(
             f"overruns: {', '.join(late)}",
@@ -45,7 +47,9 @@ def describe_executor(reply: Any, denied_here: Sequence[str]) -> Iterator[Findin
             remedy="docs/howto/repair_a_faulted_component.md",
         )
     for line in reply.warnings:
-        yield warning(line, cost="requests may reach another executor, or none", remedy="docs/howto/operate.md")
+        yield warning(
+            line, cost="requests may reach another executor, or none", remedy="docs/howto/operate.md"
+        )
     count = counted(len(reply.components), "component")
     granted = "all real-time rights" if reply.realtime.granted else "not all real-time rights"
     yield ok(f"{count}, revision {reply.revision}, {granted}")

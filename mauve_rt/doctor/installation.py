@@ -13,7 +13,7 @@ from mauve_rt.native_program import native_prefix
 _REBUILD = "build its package again against this MAUVE RT: mauve build, or scripts/setup for its own"
 _TRIAL_S = 10.0
 _KERNEL = "/mauve_rt/_kernel"
-_EXECUTOR = "/lib/mauve_rt/executor"
+_EXECUTOR, _MODULE = "/lib/mauve_rt/executor", "mauve_rt.node.executor.main"
 
 
 def check_plugin_index(_computer: Computer) -> Iterator[Finding]:
@@ -55,7 +55,11 @@ def check_plugin_libraries(_computer: Computer) -> Iterator[Finding]:
     from mauve_rt.model.plugins import PluginIndex  # noqa: PLC0415
 
     libraries = sorted(
-        {plugin.library for plugin in PluginIndex.installed() if not plugin.is_python and plugin.library.is_file()}
+        {
+            plugin.library
+            for plugin in PluginIndex.installed()
+            if not plugin.is_python and plugin.library.is_file()
+        }
     )
     try:
         try_plugins(libraries, [], generation=1, timeout_s=_TRIAL_S)
@@ -95,18 +99,24 @@ def check_one_build(_computer: Computer) -> Iterator[Finding]:
         places={
             "the Python sources": prefix if sources == Path(_kernel.__file__).parent else sources,
             "`ros2 run mauve_rt`": share.resolve().parents[1] if share else None,
-            "the command `mauve`": Path(found).resolve().parents[1] if (found := shutil.which("mauve")) else None,
+            "the command `mauve`": Path(found).resolve().parents[1]
+            if (found := shutil.which("mauve"))
+            else None,
         },
     )
 
 
-def describe_build(prefix: Path, *, versions: tuple[str, str], places: dict[str, Path | None]) -> Iterator[Finding]:
+def describe_build(
+    prefix: Path, *, versions: tuple[str, str], places: dict[str, Path | None]
+) -> Iterator[Finding]:
     """`places`: the prefix that each part is installed in; None: there is no such part."""
     sources, native = versions
     is_one = True
     if not (prefix / _EXECUTOR.removeprefix("/")).is_file():
         is_one = False
-        yield error(f"no executor in {prefix}{_EXECUTOR}", cost="mauve run starts nothing", remedy="scripts/setup")
+        yield error(
+            f"no executor in {prefix}{_EXECUTOR}", cost="mauve run starts nothing", remedy="scripts/setup"
+        )
     if sources != native:
         is_one = False
         yield error(
@@ -154,7 +164,7 @@ def executor_processes(computer: Computer) -> list[Path]:
 
 
 def _is_executor(process: Path) -> bool:
-    return any(word.endswith(_EXECUTOR) for word in _words(process / "cmdline")[:3])
+    return any(word.endswith((_EXECUTOR, _MODULE)) for word in _words(process / "cmdline")[:3])
 
 
 def _domain(process: Path) -> str | None:

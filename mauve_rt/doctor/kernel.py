@@ -121,7 +121,11 @@ def check_steal(computer: Computer) -> Iterator[Finding]:
     text = f"the host took {percent:.2g} % of the CPU time since the start"
     if percent > _NOTABLE_STEAL:
         cost = "components of all priorities stood still for this time"
-        yield warning(text, cost=cost, remedy="give the virtual machine CPUs of its own, or use a computer without a host")
+        yield warning(
+            text,
+            cost=cost,
+            remedy="give the virtual machine CPUs of its own, or use a computer without a host",
+        )
     else:
         yield ok(text)
 

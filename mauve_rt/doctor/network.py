@@ -12,7 +12,12 @@ from mauve_rt.counts import counted
 from mauve_rt.doctor.finding import Computer, Finding, error, ok, warning
 from mauve_rt.node.shared.discovery import RANGE, is_off, limit_discovery, opened_by
 from mauve_rt.node.shared.domain import domain, domain_problem
-from mauve_rt.node.shared.loopback import LoopbackError, loopback_environment, users_profile, waiting_transport
+from mauve_rt.node.shared.loopback import (
+    LoopbackError,
+    loopback_environment,
+    users_profile,
+    waiting_transport,
+)
 from mauve_rt.node.shared.rtps_ports import participants_by_domain
 
 _DISTRIBUTION = "jazzy"
@@ -48,7 +53,11 @@ def check_middleware(_computer: Computer) -> Iterator[Finding]:
         limit_discovery()  # as each program of the project does
         loopback_environment()
     except LoopbackError as problem:
-        yield error(str(problem), cost="executors refuse to start", remedy="export RMW_IMPLEMENTATION=rmw_fastrtps_cpp")
+        yield error(
+            str(problem),
+            cost="executors refuse to start",
+            remedy="export RMW_IMPLEMENTATION=rmw_fastrtps_cpp",
+        )
     else:
         yield ok(name)
 
@@ -64,7 +73,11 @@ def check_reach(_computer: Computer) -> Iterator[Finding]:
         yield warning(f"{RANGE}=OFF", cost=cost, remedy=f"export {RANGE}=LOCALHOST")
     elif opened := opened_by():
         cost = "without DDS Security any computer that reaches this one can reconfigure an executor"
-        yield warning(f"open to other computers ({opened})", cost=cost, remedy=f"unset {opened_names(opened)}, or: {_PAGE}")
+        yield warning(
+            f"open to other computers ({opened})",
+            cost=cost,
+            remedy=f"unset {opened_names(opened)}, or: {_PAGE}",
+        )
     elif profile := users_profile():
         cost = "the profile of Fast DDS decides which computers reach an executor; an executor may refuse to start with it"
         yield warning(f"a profile of your own ({profile})", cost=cost, remedy=_PAGE)
@@ -107,11 +120,17 @@ def exchange(limit_s: float) -> tuple[int, str, str]:
     command = [sys.executable, "-P", "-m", _PROGRAM]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(entry for entry in sys.path if entry)}
     words = (topic, f"{limit_s}")
-    sender = subprocess.Popen([*command, "send", *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    sender = subprocess.Popen(
+        [*command, "send", *words], env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
     try:
         done = subprocess.run(
             [*command, "receive", *words],
-            env=environment, capture_output=True, text=True, timeout=2 * limit_s, check=False,
+            env=environment,
+            capture_output=True,
+            text=True,
+            timeout=2 * limit_s,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         return 1, "", "the receiver hangs"

@@ -5,7 +5,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
@@ -221,7 +220,7 @@ def test_the_shared_memory_of_a_killed_participant_is_found(
     try:
         assert process.stdout is not None and process.stdout.readline() == "ready\n"
         new = [file for file in memory.glob("fastrtps_*_el") if file.name not in before]
-        live, _ = storage._dead_segments(memory)  # noqa: SLF001
+        live, _ = storage._dead_segments(memory)
         assert new, "Fast DDS uses shared memory"
         mine = [file for file in new if _is_held_by(file, process.pid)]
         assert mine and not set(mine) & set(live)
@@ -229,7 +228,7 @@ def test_the_shared_memory_of_a_killed_participant_is_found(
         process.kill()
         process.wait()
     try:
-        dead, _ = storage._dead_segments(memory)  # noqa: SLF001
+        dead, _ = storage._dead_segments(memory)
         assert set(mine) <= set(dead)
     finally:
         for file in mine:
@@ -306,7 +305,9 @@ def test_a_line_of_the_index_that_names_a_missing_library(
     complaint, missing = installation.check_plugin_index(Computer())
     assert (complaint.status, f"{index / 'lost'}:2:1" in complaint.found) == (Status.WARNING, True)
     assert missing.status == Status.ERROR
-    assert missing.found == f"{tmp_path / 'lib/liblost.so'} is missing; the index lists shell lost/Shell of it"
+    assert (
+        missing.found == f"{tmp_path / 'lib/liblost.so'} is missing; the index lists shell lost/Shell of it"
+    )
 
 
 def test_a_library_that_does_not_load_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

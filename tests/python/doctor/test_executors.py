@@ -10,7 +10,9 @@ from mauve_rt.doctor.finding import Status
 DENIED = "SCHED_FIFO priority 80 (the rtprio limit is 0): components can be late"
 
 
-def found(*, missing: tuple[str, ...] = (), here: tuple[str, ...] = (), **component: Any) -> list[tuple[Status, str]]:
+def found(
+    *, missing: tuple[str, ...] = (), here: tuple[str, ...] = (), **component: Any
+) -> list[tuple[Status, str]]:
     fields = {"name": "control", "policy": "SCHED_FIFO", "state": ComponentInfo.RUNNING} | component
     reply = ListComponents.Response(
         revision=7,

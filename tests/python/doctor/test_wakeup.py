@@ -72,5 +72,9 @@ def test_cost_and_remedy_stand_beneath_a_finding(capsys: pytest.CaptureFixture[s
     print_summary(findings)
     lines = capsys.readouterr().out.splitlines()
     assert lines[0].split(None, 2) == ["OK", "one", "[all] well\\x1b[31m"]
-    assert [" ".join(line.split()) for line in lines[1:4]] == ["error two bad", "cost: it stops", "remedy: rm [a]"]
+    assert [" ".join(line.split()) for line in lines[1:4]] == [
+        "error two bad",
+        "cost: it stops",
+        "remedy: rm [a]",
+    ]
     assert lines[-1] == "1 error, 0 warnings"

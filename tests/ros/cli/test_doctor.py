@@ -63,7 +63,9 @@ def test_the_report_is_one_line_a_check(doctor: Doctor) -> None:
     assert "\x1b" not in done.stdout  # a pipe
 
 
-@pytest.mark.parametrize("kept", [("PYTHONPATH", "LD_LIBRARY_PATH"), ("PYTHONPATH", "LD_LIBRARY_PATH", "HOME")])
+@pytest.mark.parametrize(
+    "kept", [("PYTHONPATH", "LD_LIBRARY_PATH"), ("PYTHONPATH", "LD_LIBRARY_PATH", "HOME")]
+)
 def test_a_bare_environment_has_findings_and_no_traceback(doctor: Doctor, kept: tuple[str, ...]) -> None:
     done = doctor("--json", "--seconds", "0.2", environment={name: os.environ[name] for name in kept})
     assert done.returncode == 1, done.stderr
