@@ -69,7 +69,7 @@ def assumptions_about(
 
 
 def runtime_us(root: Path = _ROOT) -> int:
-    """The time in each second that the kernel gives to real-time threads, in us; -1: it does not limit them."""
+    """The us of each second that the kernel gives to real-time threads; -1: it does not limit them."""
     file = root / "proc/sys/kernel/sched_rt_runtime_us"
     return int(file.read_text("ascii")) if file.exists() else _NOT_THROTTLED
 

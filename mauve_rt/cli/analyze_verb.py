@@ -147,17 +147,14 @@ def _measured_wakeup_us(path: Path) -> int:
     from mauve_rt.errors import ParameterError, exception_text  # noqa: PLC0415
 
     try:
-        found = json.loads(path.read_text("utf-8"))
-        measured = found["wakeup"]["wakeup_us"]
-        if not math.isfinite(measured) or measured < 0:
-            raise ValueError(f"wakeup_us is {measured:g}")
+        measured = float(json.loads(path.read_text("utf-8"))["wakeup"]["wakeup_us"])
     except OSError as error:
         raise ParameterError(f"--doctor: {path}: {error.strerror}") from None
     except (ValueError, KeyError, TypeError) as error:
-        remedy = "write it with `mauve doctor --json`, without --seconds 0"
-        raise ParameterError(
-            f"--doctor: {path} has no wake-up latency ({exception_text(error)}); {remedy}"
-        ) from None
+        what = f"--doctor: {path} has no wake-up latency ({exception_text(error)})"
+        raise ParameterError(f"{what}; write it with `mauve doctor --json`, without --seconds 0") from None
+    if not math.isfinite(measured) or measured < 0:
+        raise ParameterError(f"--doctor: {path}: wakeup_us: expected 0 or more, found {measured:g}")
     return math.ceil(measured)
 
 

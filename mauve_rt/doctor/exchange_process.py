@@ -22,7 +22,7 @@ def main() -> int:
     try:
         keep_to_this_machine()
     except LoopbackError as error:
-        print(error, file=sys.stderr)
+        sys.stderr.write(f"{error}\n")
         return 2
     import rclpy  # noqa: PLC0415 - reads the environment
     from rclpy.node import Node  # noqa: PLC0415
@@ -48,9 +48,9 @@ def main() -> int:
         else:
             rclpy.spin_once(node, timeout_sec=_EVERY_S)
     if received:
-        print(f"{time.monotonic() - begun_s:.3f}")
+        sys.stdout.write(f"{time.monotonic() - begun_s:.3f}\n")
     node.destroy_node()
-    rclpy.try_shutdown()
+    node.context.try_shutdown()
     return 0 if received else 1
 
 

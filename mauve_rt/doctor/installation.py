@@ -12,6 +12,7 @@ from mauve_rt.native_program import native_prefix
 
 _REBUILD = "build its package again against this MAUVE RT: mauve build, or scripts/setup for its own"
 _TRIAL_S = 10.0
+_NAMED = 3
 _KERNEL = "/mauve_rt/_kernel"
 _EXECUTOR, _MODULE = "/lib/mauve_rt/executor", "mauve_rt.node.executor.main"
 
@@ -149,7 +150,7 @@ def check_executor_processes(computer: Computer) -> Iterator[Finding]:
         if kernel and kernel != own:
             yield warning(
                 f"{text} runs {kernel}, this shell {own}",
-                cost="the executor runs code of another build than mauve, or one that was replaced on the disk",
+                cost="the executor runs another build than mauve, or one that was replaced on the disk",
                 remedy="start the executor again from this shell",
             )
         else:
@@ -191,4 +192,5 @@ def _words(file: Path) -> list[str]:
 
 
 def _some(names: list[str]) -> str:
-    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+    more = len(names) - _NAMED
+    return ", ".join(names[:_NAMED]) + (f" and {more} more" if more > 0 else "")

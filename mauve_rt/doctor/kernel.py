@@ -1,4 +1,4 @@
-"""Checks of the Linux kernel: preemption, throttling, CPUs, clocks, and what a host or a cgroup takes away."""
+"""Checks of the Linux kernel: preemption, throttling, CPUs, clocks, and what a host or cgroup takes away."""
 
 import re
 from collections.abc import Iterator
@@ -96,7 +96,7 @@ def check_clock_source(computer: Computer) -> Iterator[Finding]:
         yield warning(
             source,
             cost="each reading of the clock takes about 1 us, and an activation has at least two",
-            remedy="add clocksource=tsc tsc=reliable to the kernel's command line if the CPU has a stable TSC",
+            remedy="add clocksource=tsc tsc=reliable to the kernel's command line, if the TSC is stable",
         )
     else:
         yield ok(source)
@@ -167,8 +167,8 @@ def check_memory_limit(computer: Computer) -> Iterator[Finding]:
     else:
         yield warning(
             text,
-            cost="an executor keeps all its memory locked: the kernel ends a program when the limit is reached",
-            remedy=f"allow at least {_LEAST_MEMORY >> 20} MiB: MemoryMax= of the unit, --memory of the container",
+            cost="an executor keeps all its memory locked: at the limit the kernel ends a program",
+            remedy=f"allow at least {_LEAST_MEMORY >> 20} MiB: MemoryMax= of a unit, --memory of a container",
         )
 
 

@@ -39,7 +39,7 @@ def check_distribution(_computer: Computer) -> Iterator[Finding]:
     elif named not in ("", _DISTRIBUTION):
         yield error(
             f"ROS_DISTRO={named}",
-            cost=f"MAUVE RT is built for ROS 2 {_DISTRIBUTION.capitalize()}: libraries of both do not fit together",
+            cost=f"MAUVE RT is built for ROS 2 {_DISTRIBUTION.capitalize()}: both do not fit together",
             remedy=f"open a new shell and source /opt/ros/{_DISTRIBUTION}/setup.bash only",
         )
     else:
@@ -79,7 +79,7 @@ def check_reach(_computer: Computer) -> Iterator[Finding]:
             remedy=f"unset {opened_names(opened)}, or: {_PAGE}",
         )
     elif profile := users_profile():
-        cost = "the profile of Fast DDS decides which computers reach an executor; an executor may refuse to start with it"
+        cost = "this profile decides which computers reach an executor, and an executor may refuse to start"
         yield warning(f"a profile of your own ({profile})", cost=cost, remedy=_PAGE)
     else:
         yield ok(f"this computer only, ROS_DOMAIN_ID {domain()}")

@@ -36,7 +36,7 @@ class CpuWakeup:
     p999_us: float
     max_us: float
     histogram: list[tuple[float | None, int]]
-    """(upper edge in us, or None for above all; how many latencies are below it and not below the one before)."""
+    """(upper edge in us, None of the last range; how many latencies are in the range)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,7 +149,8 @@ def _release_ns(name: str, releases: Any, first: _Reading, last: _Reading) -> in
 
 def describe(wakeup: Wakeup) -> Iterator[Finding]:
     """The test as one line of the report."""
-    found = f"longest {wakeup.wakeup_us:.0f} us at 1 kHz in {wakeup.seconds:g} s on {counted(len(wakeup.cpus), 'CPU')}"
+    where = counted(len(wakeup.cpus), "CPU")
+    found = f"longest {wakeup.wakeup_us:.0f} us at 1 kHz in {wakeup.seconds:g} s on {where}"
     if not wakeup.is_fifo:
         yield warning(
             f"{found}, as SCHED_OTHER",

@@ -374,7 +374,7 @@ def test_the_wakeup_latency_is_the_longest_that_doctor_measured(analyze: Analyze
     [
         ("", "has no wake-up latency"),
         ('{"findings": [], "wakeup": null}', "without --seconds 0"),
-        ('{"wakeup": {"wakeup_us": -1}}', "wakeup_us is -1"),
+        ('{"wakeup": {"wakeup_us": -1}}', "wakeup_us: expected 0 or more, found -1"),
         ('{"wakeup": {"wakeup_us": "fast"}}', "has no wake-up latency"),
         (None, "No such file"),
     ],

@@ -1,4 +1,4 @@
-"""The checks of `mauve doctor` on trees of files that stand for a computer: one that suits, and one that does not."""
+"""The checks of `mauve doctor` on trees of files: of a computer that suits, and of one that does not."""
 
 import fcntl
 import os
@@ -16,6 +16,7 @@ from mauve_rt.doctor.checks import CHECKS, Check, examine
 from mauve_rt.doctor.finding import Computer, Finding, Status
 from mauve_rt.native_program import native_prefix
 
+SHARED, TEMPORARY = "/dev/shm", "/tmp"  # noqa: S108 - of a tree, or Fast DDS's
 Examine = Callable[[Computer], Iterator[Finding]]
 SUITED = {
     "/proc/sys/kernel/osrelease": "6.12.5-rt\n",
@@ -32,8 +33,8 @@ SUITED = {
     "/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor": "performance\n",
     "/sys/devices/system/cpu/cpu1/cpufreq/scaling_governor": "performance\n",
     "/sys/devices/system/clocksource/clocksource0/current_clocksource": "tsc\n",
-    "/dev/shm/keep": "",
-    "/tmp/keep": "",
+    f"{SHARED}/keep": "",
+    f"{TEMPORARY}/keep": "",
 }
 V1 = {
     "/proc/self/cgroup": "5:cpu,cpuacct:/robot\n4:memory:/robot\n",
@@ -111,7 +112,8 @@ def test_what_does_not_suit_has_its_cost_and_its_remedy(
     [finding] = check(tree(tmp_path, **files))
     assert finding.status == status
     assert words in finding.found
-    assert finding.cost and finding.remedy
+    assert finding.cost
+    assert finding.remedy
 
 
 def test_what_cannot_be_read_is_a_finding(tmp_path: Path) -> None:
@@ -161,9 +163,9 @@ def test_rights_have_the_words_of_the_kernel_and_the_limits() -> None:
 
 def test_shared_memory_that_is_missing_is_an_error(tmp_path: Path) -> None:
     [there] = storage.check_shared_memory(tree(tmp_path / "there"))
-    assert "/dev/shm" in there.found
+    assert SHARED in there.found
     [missing] = storage.check_shared_memory(Computer(tmp_path))
-    assert (missing.status, missing.found) == (Status.ERROR, "/dev/shm is missing")
+    assert (missing.status, missing.found) == (Status.ERROR, f"{SHARED} is missing")
 
 
 def test_little_room_is_a_warning() -> None:
@@ -211,19 +213,21 @@ def test_the_shared_memory_of_a_killed_participant_is_found(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """As Fast DDS leaves it."""
-    memory = Path("/dev/shm")
+    memory = Path(SHARED)
     environment = os.environ | {"ROS_DOMAIN_ID": "50", "ROS_LOG_DIR": str(tmp_path)}
     before = {file.name for file in memory.iterdir()}
     process = subprocess.Popen(
         [sys.executable, "-c", _PARTICIPANT], env=environment, stdout=subprocess.PIPE, text=True
     )
     try:
-        assert process.stdout is not None and process.stdout.readline() == "ready\n"
+        assert process.stdout is not None
+        assert process.stdout.readline() == "ready\n"
         new = [file for file in memory.glob("fastrtps_*_el") if file.name not in before]
         live, _ = storage._dead_segments(memory)
         assert new, "Fast DDS uses shared memory"
         mine = [file for file in new if _is_held_by(file, process.pid)]
-        assert mine and not set(mine) & set(live)
+        assert mine
+        assert not set(mine) & set(live)
     finally:
         process.kill()
         process.wait()
@@ -237,8 +241,7 @@ def test_the_shared_memory_of_a_killed_participant_is_found(
 
 
 def _is_held_by(file: Path, process: int) -> bool:
-    links = (f"/proc/{process}/fd/{name}" for name in os.listdir(f"/proc/{process}/fd"))
-    return any(os.path.realpath(link) == str(file) for link in links)
+    return any(link.resolve() == file for link in Path(f"/proc/{process}/fd").iterdir())
 
 
 def test_participants_are_counted_by_domain(tmp_path: Path) -> None:

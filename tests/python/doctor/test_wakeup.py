@@ -1,4 +1,4 @@
-"""The wake-up test of `mauve doctor`: it runs, its figures fit together, and the report says what they mean."""
+"""The wake-up test of `mauve doctor`: its figures fit together, and the report says what they mean."""
 
 import os
 from dataclasses import replace
