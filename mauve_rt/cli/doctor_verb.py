@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"length of the wake-up test (default {_SECONDS:g}; 0: leave it out)",
     )
     parser.add_argument(
-        "--json", action="store_true", help="print JSON, for programs and for `mauve analyze --doctor`"
+        "--json", action="store_true", help="print JSON, for programs and for `mauve analyze`"
     )
 
 

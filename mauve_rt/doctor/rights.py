@@ -11,10 +11,23 @@ _LIMITS = {"rtprio": (resource.RLIMIT_RTPRIO, ""), "memlock": (resource.RLIMIT_M
 
 
 def missing_rights() -> list[str]:
-    """One line for each right that the system denies this process: right, effect, how to grant it."""
-    from mauve_rt._kernel import Architecture, Deployer, PluginRegistry  # noqa: PLC0415 - takes its time to load
+    """One line for each right that the system denies this process: right, effect, how to grant it.
 
-    deployer = Deployer(Architecture(PluginRegistry()), trace=False)
+    Asked for a component of the highest priority, which is never deployed.
+    """
+    from mauve_rt._kernel import (  # noqa: PLC0415 - takes its time to load
+        TASK_SETTINGS,
+        Architecture,
+        Deployer,
+        PluginRegistry,
+    )
+    from mauve_rt.parts.cores import Core  # noqa: PLC0415
+    from mauve_rt.parts.fsms import Fsm  # noqa: PLC0415
+    from mauve_rt.parts.shells import Shell  # noqa: PLC0415
+
+    architecture = Architecture(PluginRegistry())
+    architecture.add_component("trial", Shell, Core, Fsm, priority=TASK_SETTINGS["priority"].most)
+    deployer = Deployer(architecture, trace=False)
     deployer.prepare_process()
     return list(deployer.realtime_status().missing)
 

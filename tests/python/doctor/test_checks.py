@@ -154,6 +154,7 @@ def test_rights_have_the_words_of_the_kernel_and_the_limits() -> None:
     if denied:  # without rights, as in most containers
         assert [each.found for each in found] == denied
         assert all(each.status == Status.WARNING and each.remedy for each in found)
+        assert not any("priority 1 " in each.found for each in found)  # a low limit is not enough
     [granted] = rights.describe_rights([], rights.limits())
     assert granted.status == Status.OK
     assert re.search(r"rtprio (\d+|unlimited), memlock (\d+|unlimited)", granted.found)
