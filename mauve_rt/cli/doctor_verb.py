@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 from mauve_rt.cli.arguments import absolute_name
 from mauve_rt.cli.completion import complete_executors, completed_by
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED
-from mauve_rt.errors import MauveError, one_line
+from mauve_rt.errors import MauveError, exception_text, one_line
 
 if TYPE_CHECKING:
     from mauve_rt.doctor.finding import Finding
     from mauve_rt.doctor.wakeup import Wakeup
 
 _SECONDS, _MOST_SECONDS = 5.0, 86_400.0
-_WAKEUP = "wake-up test"
+_EXECUTORS, _WAKEUP = "executors", "wake-up test"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,14 +75,23 @@ def main(args: argparse.Namespace) -> int:
 
 def _examined(node: str | None) -> "Iterator[Finding]":
     from mauve_rt.doctor.checks import CHECKS, examine  # noqa: PLC0415
-    from mauve_rt.doctor.finding import Computer  # noqa: PLC0415
+    from mauve_rt.doctor.executors import describe_not_asked  # noqa: PLC0415
+    from mauve_rt.doctor.finding import Computer, Status  # noqa: PLC0415
+    from mauve_rt.doctor.network import check_discovery  # noqa: PLC0415
 
+    is_reached = True
     for check in CHECKS:
-        yield from examine(check, Computer())
+        found = examine(check, Computer())
+        if check.examine is check_discovery:
+            is_reached = all(each.status == Status.OK for each in found)
+        yield from found
+    if not is_reached:  # the wrong middleware would end this process
+        yield replace(describe_not_asked(node), name=node or _EXECUTORS)
+        return
     try:
         yield from _of_executors(node)
-    except ImportError as problem:  # no ROS: the check of the distribution says more
-        yield _unreached("executors", one_line(str(problem)))
+    except Exception as problem:  # noqa: BLE001 - whatever ROS raises is a finding
+        yield _unreached(node or _EXECUTORS, exception_text(problem))
 
 
 def _of_executors(node: str | None) -> "Iterator[Finding]":
@@ -92,7 +101,7 @@ def _of_executors(node: str | None) -> "Iterator[Finding]":
     from mauve_rt.doctor.executors import describe_executor, describe_found  # noqa: PLC0415
     from mauve_rt.doctor.rights import missing_rights  # noqa: PLC0415
 
-    name = "executors"
+    name = _EXECUTORS
     try:
         with connected(first=True) as client:
             for finding in describe_found(client.find_executors()):

@@ -55,6 +55,16 @@ def describe_executor(reply: Any, denied_here: Sequence[str]) -> Iterator[Findin
     yield ok(f"{count}, revision {reply.revision}, {granted}")
 
 
+def describe_not_asked(node: str | None) -> Finding:
+    """Executors that cannot be asked, as discovery does not work; an error where one is named."""
+    report = warning if node is None else error
+    return report(
+        "not asked, as discovery does not work",
+        cost="mauve and supervisors reach no executor",
+        remedy="mend what the line `discovery` says",
+    )
+
+
 def describe_unreached(problem: str) -> Finding:
     """An executor that does not answer."""
     return error(

@@ -4,7 +4,12 @@ from typing import Any
 
 from mauve_msgs.msg import ComponentInfo, RealtimeStatus
 from mauve_msgs.srv import ListComponents
-from mauve_rt.doctor.executors import describe_executor, describe_found, describe_unreached
+from mauve_rt.doctor.executors import (
+    describe_executor,
+    describe_found,
+    describe_not_asked,
+    describe_unreached,
+)
 from mauve_rt.doctor.finding import Status
 
 DENIED = "SCHED_FIFO priority 80 (the rtprio limit is 0): components can be late"
@@ -49,4 +54,6 @@ def test_components_that_are_late_faulted_or_no_longer_real_time() -> None:
 def test_executors_that_answer_or_do_not() -> None:
     assert [each.found for each in describe_found(["/a", "/b"])] == ["/a, /b"]
     assert [each.found for each in describe_found([])] == ["none"]
+    assert describe_not_asked(None).status == Status.WARNING
+    assert describe_not_asked("/a").status == Status.ERROR
     assert describe_unreached("no executor /a").status == Status.ERROR

@@ -77,6 +77,23 @@ def test_a_bare_environment_has_findings_and_no_traceback(doctor: Doctor, kept: 
     assert names["wake-up test"][0]["status"] == "warning"
 
 
+@pytest.mark.parametrize(
+    ("variable", "value", "check"),
+    [
+        ("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp", "middleware"),
+        ("ROS_DISTRO", "humble", "ROS distribution"),
+    ],
+)
+def test_what_ends_other_programs_is_an_error_and_the_report_goes_on(
+    doctor: Doctor, variable: str, value: str, check: str
+) -> None:
+    done = doctor("--json", "--seconds", "0", environment={**os.environ, variable: value})
+    assert done.returncode == 1, done.stderr
+    names = _by_name(done.stdout)
+    assert [each["status"] for each in names[check]] == ["error"]
+    assert names.keys() >= {each.name for each in CHECKS} | {"executors"}
+
+
 def test_an_executor_is_asked_for_its_own_state(doctor: Doctor, executor: Any) -> None:
     names = _by_name(doctor(NODE, "--json", "--seconds", "0").stdout)
     assert NODE in names["executors"][0]["found"].split(", ")
