@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 
 import pytest
+from compiled_plugins import link
 
 from mauve_rt import _kernel
 from mauve_rt.doctor import installation, kernel, network, rights, storage
@@ -325,6 +326,19 @@ def test_a_library_that_does_not_load_is_an_error(monkeypatch: pytest.MonkeyPatc
     status, found, remedy = _only(installation.check_plugin_libraries)
     assert (status, "libtorn.so" in found) == (Status.ERROR, True)
     assert "build its package again" in remedy
+
+
+def test_a_library_of_another_version_is_an_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    index = tmp_path / "share/ament_index/resource_index/mauve_rt_plugins"
+    index.mkdir(parents=True)
+    (index / "old").write_text("shell; old/Shell; ; old\n", encoding="utf-8")
+    (tmp_path / "lib").mkdir()
+    source = tmp_path / "old.cpp"
+    source.write_text('extern "C" void mauve_register_plugins(void*) {}\n', encoding="utf-8")
+    link([source], tmp_path / "lib" / "libold.so", "-fPIC")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{tmp_path}{os.pathsep}{os.environ['AMENT_PREFIX_PATH']}")
+    status, found, _ = _only(installation.check_plugin_libraries)
+    assert (status, "built against another version of MAUVE RT" in found) == (Status.ERROR, True), found
 
 
 def test_parts_of_two_builds_are_named(tmp_path: Path) -> None:
