@@ -8,6 +8,9 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from mauve_rt.analysis.obstacles import is_virtual
+from mauve_rt.doctor.kernel import preemption
+
 
 @dataclass(frozen=True, kw_only=True)
 class Machine:
@@ -42,14 +45,13 @@ def describe() -> Machine:
     """Look at the machine."""
     cpuinfo = _text("/proc/cpuinfo")
     model = re.search(r"^model name\s*:\s*(.*)$", cpuinfo, re.MULTILINE)
-    flags = re.search(r"^flags\s*:\s*(.*)$", cpuinfo, re.MULTILINE)
     return Machine(
         date=datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC"),
         cpu=model[1].strip() if model else platform.machine(),
         cpus=len(os.sched_getaffinity(0)),
         kernel=platform.release(),
-        preemption=_preemption(),
-        virtualised=flags is not None and "hypervisor" in flags[1].split(),
+        preemption=preemption(),
+        virtualised=is_virtual(),
         load=os.getloadavg(),
         missing=_missing_rights(),
     )
@@ -88,14 +90,6 @@ class IdleMeter(_ShareMeter):
 def _cpu_times() -> list[int]:
     words = _text("/proc/stat").splitlines()[0].split()[1:]
     return [int(word) for word in words[: _STEAL + 1]]
-
-
-def _preemption() -> str:
-    if _text("/sys/kernel/realtime").strip() == "1":
-        return "PREEMPT_RT"
-    chosen = re.search(r"\((\w+)\)", _text("/sys/kernel/debug/sched/preempt"))
-    built = re.search(r"PREEMPT\w*", platform.version())
-    return (built[0] if built else "no preemption named") + (f" ({chosen[1]})" if chosen else "")
 
 
 def _missing_rights() -> list[str]:

@@ -7,8 +7,8 @@ from typing import Any
 from mauve_rt.analysis.locks import named_twice
 from mauve_rt.analysis.machines import Machine, in_ms
 
-_RUNTIME = Path("/proc/sys/kernel/sched_rt_runtime_us")
-_CPU = Path("/proc/cpuinfo")
+_ROOT = Path("/")
+_NOT_THROTTLED = -1
 
 
 def obstacles(machine: Machine, others: Sequence[Machine] = ()) -> Iterator[str]:
@@ -101,14 +101,24 @@ def assumptions_about(machines: Sequence[Machine]) -> Iterator[str]:
     for machine in machines:
         if machine.clients:
             yield f"wcet_ns of {machine.name} has its waits for services in it ({', '.join(machine.clients)})"
-    runtime = _RUNTIME.read_text("ascii").strip() if _RUNTIME.exists() else "-1"
-    if runtime != "-1":
+    if (runtime := runtime_us()) != _NOT_THROTTLED:
         yield (
             f"components leave the rest of {runtime} us in each s, to which real-time threads are throttled "
             "(kernel.sched_rt_runtime_us: -1 switches that off)"
         )
-    words = _CPU.read_text("utf-8", "replace").split() if _CPU.exists() else []
-    if "hypervisor" in words:
+    if is_virtual():
         yield "the host of this virtual machine takes no CPU from it"
     yield "no other real-time thread runs on these CPUs, and no interrupt takes one for long"
     yield "no component faults, stops or is changed, and no rule of the executor acts"
+
+
+def runtime_us(root: Path = _ROOT) -> int:
+    """The us of each second that the kernel gives to real-time threads; -1: it does not limit them."""
+    file = root / "proc/sys/kernel/sched_rt_runtime_us"
+    return int(file.read_text("ascii")) if file.exists() else _NOT_THROTTLED
+
+
+def is_virtual(root: Path = _ROOT) -> bool:
+    """Whether the computer is a virtual machine, by the flags of its CPUs."""
+    file = root / "proc/cpuinfo"
+    return file.exists() and "hypervisor" in file.read_text("utf-8", "replace").split()

@@ -44,12 +44,13 @@ def judge(
     *,
     wakeup_ns: int = 0,
     unknown: Sequence[str] = (),
+    measured: Sequence[str] = (),
     contradictions: Sequence[str] = (),
 ) -> Verdict:
     """The verdict on components and their bounds; both with the same `wakeup_ns`.
 
-    `unknown`: what is not known beside them, in words: nothing is proved then. `contradictions`: what a
-    recording says against the bounds.
+    `unknown`: what is not known beside them, in words: nothing is proved then. `measured`: of what else times
+    are measured. `contradictions`: what a recording says against the bounds.
     """
     components = [subject for subject in subjects if subject.machine.is_component]
     late = [subject for subject in components if not bounds[subject.name].meets_deadline]
@@ -69,9 +70,8 @@ def judge(
         return Verdict(Outcome.NOT_PROVED, f"{reasons}; none of {RUNS} runs misses a deadline")
     if contradictions:
         return Verdict(Outcome.REFUTED, "; ".join(contradictions))
-    measured = [subject.name for subject in components if subject.machine.measured]
-    if measured:
-        names = ", ".join(measured)
+    names = ", ".join([*(one.name for one in components if one.machine.measured), *measured])
+    if names:
         why = f"every component meets its deadline, if no time of {names} is above the measured one"
         return Verdict(Outcome.FORECAST, why)
     return Verdict(Outcome.SCHEDULABLE, "every component meets its deadline")

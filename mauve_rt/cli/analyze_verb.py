@@ -74,7 +74,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="COMPONENT.STATE=TIME",
         help="assume this time of a state, e.g. guidance.Planning=20ms; may be repeated",
     )
-    parser.add_argument(
+    wakeup = parser.add_mutually_exclusive_group()
+    wakeup.add_argument(
         "--wakeup-us",
         type=float,
         metavar="X",
@@ -85,6 +86,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         metavar="X",
         help="cost of a release beside the states, in ns, in place of the declared one",
+    )
+    wakeup.add_argument(
+        "--doctor",
+        type=Path,
+        metavar="JSON",
+        help="take both of them from this output of `mauve doctor --json`: the verdict is a forecast",
     )
     parser.add_argument(
         "--witness",
@@ -135,6 +142,7 @@ def main(args: argparse.Namespace) -> int:
         bounds,
         wakeup_ns=wakeup_ns,
         unknown=unknown,
+        measured=["this computer"] if args.doctor is not None else [],
         contradictions=[*contradictions(subjects, bounds, measured, wakeup_ns=wakeup_ns)],
     )
     assumptions = [*assumptions_about(components)]
@@ -195,11 +203,35 @@ def _with_costs(told: "ThreadList | None", args: argparse.Namespace) -> "ThreadL
     from mauve_rt.model.threads import ThreadList  # noqa: PLC0415
 
     threads = told or ThreadList(-1, -1, ())
+    if args.doctor is not None:
+        threads = replace(threads, **_measured_costs(args.doctor))
     if args.wakeup_us is not None:
         threads = replace(threads, wakeup_ns=round(args.wakeup_us * 1e3))
     if args.overhead_ns is not None:
         threads = replace(threads, overhead_ns=args.overhead_ns)
     return threads
+
+
+def _measured_costs(path: Path) -> dict[str, int]:
+    """What a release costs by `mauve doctor --json`, as fields of a ThreadList.
+
+    Raises:
+        ParameterError: the file has no such figures.
+    """
+    from mauve_rt.errors import ParameterError, exception_text  # noqa: PLC0415
+
+    try:
+        wakeup = json.loads(path.read_text("utf-8"))["wakeup"]
+        costs = {"wakeup_ns": float(wakeup["wakeup_us"]) * 1e3, "overhead_ns": float(wakeup["overhead_ns"])}
+    except OSError as error:
+        raise ParameterError(f"--doctor: {path}: {error.strerror}") from None
+    except (ValueError, KeyError, TypeError) as error:
+        what = f"--doctor: {path} has no wake-up latency ({exception_text(error)})"
+        raise ParameterError(f"{what}; write it with `mauve doctor --json`, without --seconds 0") from None
+    for name, cost_ns in costs.items():
+        if not math.isfinite(cost_ns) or cost_ns < 0:
+            raise ParameterError(f"--doctor: {path}: {name}: expected 0 or more, found {cost_ns:g}")
+    return {name: math.ceil(cost_ns) for name, cost_ns in costs.items()}
 
 
 def _model(target: str, models: Sequence[Path]) -> _Model:

@@ -16,8 +16,8 @@ from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.cli.rtps_ports import discovery_sockets
 from mauve_rt.node.shared.domain import DOMAIN, domain_problem
+from mauve_rt.node.shared.rtps_ports import discovery_sockets
 from mauve_rt.unfinished import beside
 
 _FORMAT = 1

@@ -17,11 +17,11 @@ from rclpy.context import Context
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from mauve_rt.cli.rtps_ports import UDP_TABLE, discovery_sockets
 from mauve_rt.cli.transport import by_fast_dds
 from mauve_rt.node.shared.announcement import first_participant
 from mauve_rt.node.shared.log_folder import NO_LOG_FILES
 from mauve_rt.node.shared.loopback import udp_sockets
+from mauve_rt.node.shared.rtps_ports import UDP_TABLE, discovery_sockets
 
 ANNOUNCED_S = 3.5  # by then every participant has told of itself, to whomever missed it before
 _SPOKEN_S = 0.2  # after which one more participant speaks: an answer comes within 0.11 s

@@ -13,7 +13,6 @@ from pathlib import Path
 
 from rclpy.utilities import get_rmw_implementation_identifier
 
-from mauve_rt.cli.rtps_ports import MAX_PARTICIPANTS
 from mauve_rt.errors import ParameterError
 from mauve_rt.node.shared.loopback import (
     LoopbackError,
@@ -21,7 +20,7 @@ from mauve_rt.node.shared.loopback import (
     set_environment,
     users_profile,
 )
-from mauve_rt.node.shared.rtps_ports import discovery_ports
+from mauve_rt.node.shared.rtps_ports import MAX_PARTICIPANTS, discovery_ports
 
 _TRANSPORTS = "FASTDDS_BUILTIN_TRANSPORTS"
 _MEMORY = Path("/dev/shm")  # noqa: S108 - not ours: Fast DDS's

@@ -11,6 +11,7 @@ from mauve_rt.cli import (
     changes_verb,
     check_verb,
     dev_verb,
+    doctor_verb,
     echo_verb,
     generate_verb,
     mirror_verb,
@@ -476,6 +477,12 @@ VERBS = (
         "build, test and reload code at each save, while the executor runs",
         dev_verb.add_arguments,
         dev_verb.main,
+    ),
+    Verb(
+        "doctor",
+        "examine this computer and this shell, and measure wake-up latencies",
+        doctor_verb.add_arguments,
+        doctor_verb.main,
     ),
     Verb("events", "show the reconfigurations of an executor as they happen", add_executor_and_json, _events),
     Verb(

@@ -379,6 +379,37 @@ def test_a_latency_that_cannot_be_is_refused(analyze: Analyze, latency: str) -> 
     assert "--wakeup-us: expected 0 or more" in err
 
 
+def test_the_wakeup_latency_is_the_longest_that_doctor_measured(analyze: Analyze, tmp_path: Path) -> None:
+    measured = tmp_path / "doctor.json"
+    measured.write_text('{"wakeup": {"wakeup_us": 49.2, "overhead_ns": 2500}}', encoding="utf-8")
+    status, out, _ = analyze(PAIR.replace("13950000", "13000000"), "--doctor", str(measured))
+    assert status == 4
+    assert "each release begins up to 0.049 ms late and costs 0.003 ms\n" in out
+    why = "if no time of this computer is above the measured one"
+    assert f"forecast: every component meets its deadline, {why}, and\n" in out
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "has no wake-up latency"),
+        ('{"findings": [], "wakeup": null}', "without --seconds 0"),
+        ('{"wakeup": {"wakeup_us": -1, "overhead_ns": 0}}', "wakeup_ns: expected 0 or more, found -1000"),
+        ('{"wakeup": {"wakeup_us": 1, "overhead_ns": null}}', "has no wake-up latency"),
+        ('{"wakeup": {"wakeup_us": "fast"}}', "has no wake-up latency"),
+        (None, "No such file"),
+    ],
+)
+def test_a_file_without_a_wakeup_latency_is_refused(
+    text: str | None, words: str, analyze: Analyze, tmp_path: Path
+) -> None:
+    file = tmp_path / "doctor.json"
+    if text is not None:
+        file.write_text(text, encoding="utf-8")
+    status, _, err = analyze(ROBOT, "--doctor", str(file))
+    assert (status, words in err, err.count("\n")) == (2, True, 1), err
+
+
 @pytest.mark.parametrize("margin", ["0.9", "nan", "-1"])
 def test_a_margin_below_one_is_refused(analyze: Analyze, margin: str) -> None:
     status, _, err = analyze(ROBOT, "--margin", margin)
