@@ -9,9 +9,9 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from mauve_rt.cli.views import console, duration
+from mauve_rt.cli.views import console
 from mauve_rt.control.state_age import in_words
-from mauve_rt.counts import counted
+from mauve_rt.counts import counted, duration
 
 # As mauve_msgs/msg/ComponentInfo.
 STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}

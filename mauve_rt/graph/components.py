@@ -1,0 +1,127 @@
+"""The drawing of an architecture as Fig. 1 of the paper has it: components by CPU, resources, ports as arrows."""
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from mauve_rt.counts import duration
+from mauve_rt.graph.drawing import HIGH, Drawing, Edge, Node, merged
+
+_HIGH_LOAD = 0.7
+_PORT_KINDS = {1: "read", 2: "write", 3: "call", 4: "event"}  # mauve_msgs/msg/PortInfo
+_ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Facts of a recorded run about one component."""
+
+    load: float
+    """Share of the recorded time in execution states."""
+    text: str
+    """As it is written."""
+
+
+def architecture_drawing(
+    title: str,
+    components: Iterable[Any],
+    resources: Iterable[Any] = (),
+    *,
+    periods_ns: Mapping[str, int] | None = None,
+    measured: Mapping[str, Measured] | None = None,
+) -> Drawing:
+    """Return the drawing of components and resources.
+
+    Args:
+        title: of the drawing.
+        components: ComponentInfo messages, or descriptions with the same fields.
+        resources: ResourceInfo messages, or descriptions with the same fields. Others are drawn by their name.
+        periods_ns: of components by name, instead of their own; 0: a component waits for events.
+        measured: facts of a recorded run by component.
+    """
+    found = list(components)
+    known = {one.name: one for one in resources}
+    for one in found:
+        known |= {port.resource: None for port in one.ports if port.resource and port.resource not in known}
+    nodes = [_component(one, (periods_ns or {}).get(one.name), (measured or {}).get(one.name)) for one in found]
+    nodes += [_resource(name, one, found) for name, one in known.items()]
+    edges = merged(_edge(one, port) for one in found for port in one.ports if port.resource)
+    return Drawing(title=title, nodes=tuple(nodes), edges=edges)
+
+
+def component_key(name: str) -> str:
+    """The key of a component's node."""
+    return f"component {name}"
+
+
+def resource_key(name: str) -> str:
+    """The key of a resource's node."""
+    return f"resource {name}"
+
+
+def cpus_text(cpus: Iterable[int]) -> str:
+    """`CPU 0, 2`, or `any CPU`: the frame in which components of the same CPUs stand."""
+    return f"CPU {', '.join(map(str, cpus))}" if (cpus := sorted(cpus)) else "any CPU"
+
+
+def _component(told: Any, period_ns: int | None, measured: Measured | None) -> Node:
+    period_ns = int(told.period_ns) if period_ns is None else period_ns
+    rate = duration(period_ns) if period_ns else "on events" if period_ns == 0 else ""
+    facts = [rate, f"priority {told.priority}" if told.priority else ""]
+    lines = [told.name, told.core.rpartition("/")[2], ", ".join(filter(None, facts))]
+    if measured is not None:
+        lines.append(f"load {measured.text}")
+    if lonely := [port.name for port in told.ports if not port.resource]:
+        lines.append(f"not connected: {', '.join(lonely)}")
+    properties = [text.partition("=") for text in getattr(told, "properties", ())]
+    parts = {"shell": told.shell, "core": told.core, "fsm": told.fsm}
+    return Node(
+        key=component_key(told.name),
+        kind="component",
+        lines=tuple(filter(None, lines)),
+        cluster=cpus_text(told.cpus),
+        classes=(HIGH,) if measured is not None and measured.load > _HIGH_LOAD else (),
+        tip="\n".join([told.name, *lines[3:4], *(f"{kind} {name}" for kind, name in parts.items())]),
+        details={
+            **{kind: name for kind, name in parts.items() if kind != "core"},
+            **{name: value for name, _, value in properties},
+            "state": str(getattr(told, "state", "")),
+        },
+    )
+
+
+def _resource(name: str, told: Any, components: Iterable[Any]) -> Node:
+    users = {cpus_text(one.cpus) for one in components for port in one.ports if port.resource == name}
+    names = [(side, getattr(told, side, "")) for side in _ROS_SIDES]
+    lines = [name.rpartition("/")[2], *(f"{side} {ros_name}" for side, ros_name in names if ros_name)]
+    facts = [f"kind {told.kind}", f"type {told.type}" if told.type else ""] if told is not None else []
+    return Node(
+        key=resource_key(name),
+        kind="resource",
+        lines=tuple(lines),
+        cluster=users.pop() if len(users) == 1 else "",
+        tip="\n".join([f"resource {name}", *filter(None, facts)]),
+    )
+
+
+def _edge(component: Any, port: Any) -> Edge:
+    """Along the data: a component takes values from a resource, or gives some to it."""
+    kind = _PORT_KINDS.get(port.kind, str(port.kind))
+    takes = kind in ("read", "event") or port.service.startswith(("read", "get"))
+    ends = [component_key(component.name), resource_key(port.resource)]
+    start, end = reversed(ends) if takes else ends
+    tip = f"{component.name}.{port.name} ({kind}), {port.resource}.{port.service}"
+    return Edge(
+        start=start,
+        end=end,
+        kind="data",
+        lines=(port.name,) if port.name != port.resource.rpartition("/")[2] else (),
+        tip=f"{tip}, {port.type}" if port.type else tip,
+    )
+
+
+def named_ends(drawing: Drawing) -> Iterator[tuple[str, str]]:
+    """Yield the names of the two ends of each edge."""
+    names = {node.key: node.lines[0] if node.lines else "" for node in drawing.nodes}
+    for edge in drawing.edges:
+        yield names[edge.start], names[edge.end]
