@@ -1,6 +1,7 @@
 """A drawing in the language of Graphviz. Each text has a place of a fixed size, whatever fonts there are."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from html import escape
 
 from mauve_rt.graph import look
@@ -13,8 +14,17 @@ _CIRCLE_ROOM = 1.2  # of the diameter, for the corners of the text in it
 _POINT_PX = 10
 
 
-def dot_text(drawing: Drawing, graph: Mapping[str, str] | None = None, *, clusters: bool = True) -> str:
-    """Return the text of a .dot file; `graph` are attributes of the whole graph, such as rankdir."""
+def dot_text(
+    drawing: Drawing, graph: Mapping[str, str] | None = None, *, clusters: bool = True, spread: int = 1
+) -> str:
+    """Return the text of a .dot file.
+
+    Args:
+        drawing: the drawing.
+        graph: attributes of the whole graph, such as rankdir.
+        clusters: draw frames; otherwise each component has the title of its frame as a line.
+        spread: let arrows reach over 1, 2 ... up to so many ranks in turn.
+    """
     numbers = {node.key: f"n{index}" for index, node in enumerate(drawing.nodes)}
     settings = {
         "fontname": look.FONT,
@@ -29,12 +39,12 @@ def dot_text(drawing: Drawing, graph: Mapping[str, str] | None = None, *, cluste
         f"  node [{_attributes(_text('ink'))}]",
         f"  edge [{_attributes({**_text('ink'), 'arrowsize': '0.7'})}]",
     ]
-    titles = dict.fromkeys(node.cluster for node in drawing.nodes) if clusters else {"": None}
-    for index, title in enumerate(titles):
+    nodes = drawing.nodes if clusters else [*map(_without_frame, drawing.nodes)]
+    for index, title in enumerate(dict.fromkeys(node.cluster for node in nodes)):
         inside = [
-            f"{numbers[node.key]} [{_attributes(_node(node))}]"
-            for node in drawing.nodes
-            if node.cluster == title or not clusters
+            f"{numbers[node.key]} [{_attributes({'id': numbers[node.key], **_node(node)})}]"
+            for node in nodes
+            if node.cluster == title
         ]
         if title:
             frame = {"label": shown(title), "labeljust": "l", "style": "rounded", "color": look.light("line-strong")}
@@ -42,15 +52,22 @@ def dot_text(drawing: Drawing, graph: Mapping[str, str] | None = None, *, cluste
             lines += [f"  subgraph cluster_{index} {{", *(f"    {line}" for line in inside), "  }"]
         else:
             lines += [f"  {line}" for line in inside]
-    lines += [
-        f"  {numbers[edge.start]} -> {numbers[edge.end]} [{_attributes(_edge(edge))}]" for edge in drawing.edges
-    ]
+    for index, edge in enumerate(drawing.edges):
+        reach = {"minlen": str(1 + index % spread)} if spread > 1 else {}
+        values = _attributes({"id": f"e{index}", **_edge(edge), **reach})
+        lines.append(f"  {numbers[edge.start]} -> {numbers[edge.end]} [{values}]")
     return "\n".join([*lines, "}", ""])
 
 
 def quoted(text: str) -> str:
     """Return a text as Graphviz takes it literally: in quotes, with no escape of its own."""
     return '"{}"'.format(text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n"))
+
+
+def _without_frame(node: Node) -> Node:
+    """A component says by itself where it runs."""
+    lines = (*node.lines, node.cluster) if node.cluster and node.kind == "component" else node.lines
+    return replace(node, cluster="", lines=lines)
 
 
 def _attributes(values: Mapping[str, str]) -> str:

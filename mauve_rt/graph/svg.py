@@ -2,15 +2,14 @@
 
 import shutil
 import subprocess
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from typing import NamedTuple
 from xml.etree import ElementTree as ET
 
 from mauve_rt.graph.dot import dot_text
 from mauve_rt.graph.drawing import Drawing, Edge, Node
 from mauve_rt.graph.look import file_css
-from mauve_rt.graph.text import width_px
+from mauve_rt.graph.text import plain, shown, width_px
 
 WIDEST_PX = 1400
 INSTALL = "apt-get install graphviz"
@@ -51,7 +50,7 @@ def svg_text(drawing: Drawing, *, widest_px: int = WIDEST_PX) -> str:
     Raises:
         GraphError: Graphviz is not installed, or fails.
     """
-    root = _laid_out(drawing, widest_px)
+    root = _laid_out(drawing, widest_px, "title")
     root.set("xmlns", _SVG)
     style = ET.Element("style")
     style.text = file_css()
@@ -59,13 +58,13 @@ def svg_text(drawing: Drawing, *, widest_px: int = WIDEST_PX) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ET.tostring(root, encoding="unicode")}\n'
 
 
-def svg_element(drawing: Drawing, *, widest_px: int = WIDEST_PX) -> str:
-    """Return an SVG element for a page that has `colours_css()` and `graph_css()`.
+def svg_element(drawing: Drawing, *, widest_px: int = WIDEST_PX, tip: str = "data-tip") -> str:
+    """Return an SVG element for a page with the style sheets of `look`; `tip`: attribute, or `title`.
 
     Raises:
         GraphError: Graphviz is not installed, or fails.
     """
-    return ET.tostring(_laid_out(drawing, widest_px), encoding="unicode")
+    return ET.tostring(_laid_out(drawing, widest_px, tip), encoding="unicode")
 
 
 def _laid_out(drawing: Drawing, widest_px: int, tip: str) -> ET.Element:
@@ -99,10 +98,28 @@ def _width(root: ET.Element) -> float:
 
 def _finish(root: ET.Element, drawing: Drawing, tip: str) -> None:
     """Give nodes and edges their tips, and place the labels of edges by their middles."""
-    parts: dict[str, Iterator[Node] | Iterator[Edge]] = {"node": iter(()), "edge": iter(drawing.edges)}
-    by_number = {f"n{index}": node for index, node in enumerate(drawing.nodes)}
-    by_ends: dict[str, list[Edge]] = {}
-    del parts, by_ends, by_number
+    parts: dict[str, Node | Edge] = {f"n{index}": node for index, node in enumerate(drawing.nodes)}
+    parts |= {f"e{index}": edge for index, edge in enumerate(drawing.edges)}
+    for group in root.iter("g"):
+        part = parts.get(group.attrib.pop("id", ""))
+        title = group.find("title")
+        if title is not None:
+            group.remove(title)
+        if part is None:
+            continue
+        if tip == "title":
+            title = ET.Element("title")
+            title.text = plain(part.tip)
+            group.insert(0, title)
+        elif part.tip:
+            group.set(tip, plain(part.tip))
+        if isinstance(part, Edge):
+            wide = max(map(width_px, map(shown, part.lines)), default=0.0)
+            for text in group.iter("text"):
+                text.set("x", f"{float(text.get('x', '0')) + wide / 2:.2f}")
+                text.set("text-anchor", "middle")
+
+
 def _run(program: str, text: str) -> str:
     if shutil.which(program) is None:
         raise GraphError(f"`{program}` of Graphviz is not installed. Install it: {INSTALL}")

@@ -13,7 +13,7 @@ LINE_PX = 16
 
 def shown(text: str, most: int = _MOST_CHARACTERS) -> str:
     """Return one line without control characters, shortened to what a box holds."""
-    line = " ".join("".join(one if _is_plain(one) else " " for one in text).split())
+    line = " ".join(plain(text).split())
     return line if len(line) <= most else f"{line[: most - 1]}\N{HORIZONTAL ELLIPSIS}"
 
 
@@ -30,5 +30,6 @@ def block_px(lines: Sequence[str]) -> tuple[float, float]:
     return wide, LINE_PX * len(lines)
 
 
-def _is_plain(character: str) -> bool:
-    return not unicodedata.category(character).startswith("C")
+def plain(text: str) -> str:
+    """Return a text without control characters but ends of lines: SVG cannot hold them."""
+    return "".join(" " if one != "\n" and unicodedata.category(one).startswith("C") else one for one in text)
