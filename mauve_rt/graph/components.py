@@ -1,6 +1,6 @@
 """The drawing of an architecture as Fig. 1 of the paper has it: components by CPU, resources, ports as arrows."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,23 +27,21 @@ def architecture_drawing(
     components: Iterable[Any],
     resources: Iterable[Any] = (),
     *,
-    periods_ns: Mapping[str, int] | None = None,
     measured: Mapping[str, Measured] | None = None,
 ) -> Drawing:
     """Return the drawing of components and resources.
 
     Args:
         title: of the drawing.
-        components: ComponentInfo messages, or descriptions with the same fields.
+        components: ComponentInfo messages, or descriptions with the same fields; a period of None is not known.
         resources: ResourceInfo messages, or descriptions with the same fields. Others are drawn by their name.
-        periods_ns: of components by name, instead of their own; 0: a component waits for events.
         measured: facts of a recorded run by component.
     """
     found = list(components)
     known = {one.name: one for one in resources}
     for one in found:
         known |= {port.resource: None for port in one.ports if port.resource and port.resource not in known}
-    nodes = [_component(one, (periods_ns or {}).get(one.name), (measured or {}).get(one.name)) for one in found]
+    nodes = [_component(one, (measured or {}).get(one.name)) for one in found]
     nodes += [_resource(name, one, found) for name, one in known.items()]
     edges = merged(_edge(one, port) for one in found for port in one.ports if port.resource)
     return Drawing(title=title, nodes=tuple(nodes), edges=edges)
@@ -64,9 +62,8 @@ def cpus_text(cpus: Iterable[int]) -> str:
     return f"CPU {', '.join(map(str, cpus))}" if (cpus := sorted(cpus)) else "any CPU"
 
 
-def _component(told: Any, period_ns: int | None, measured: Measured | None) -> Node:
-    period_ns = int(told.period_ns) if period_ns is None else period_ns
-    rate = duration(period_ns) if period_ns else "on events" if period_ns == 0 else ""
+def _component(told: Any, measured: Measured | None) -> Node:
+    rate = duration(told.period_ns) if told.period_ns else "on events" if told.period_ns == 0 else ""
     facts = [rate, f"priority {told.priority}" if told.priority else ""]
     lines = [told.name, told.core.rpartition("/")[2], ", ".join(filter(None, facts))]
     if measured is not None:
@@ -118,10 +115,3 @@ def _edge(component: Any, port: Any) -> Edge:
         lines=(port.name,) if port.name != port.resource.rpartition("/")[2] else (),
         tip=f"{tip}, {port.type}" if port.type else tip,
     )
-
-
-def named_ends(drawing: Drawing) -> Iterator[tuple[str, str]]:
-    """Yield the names of the two ends of each edge."""
-    names = {node.key: node.lines[0] if node.lines else "" for node in drawing.nodes}
-    for edge in drawing.edges:
-        yield names[edge.start], names[edge.end]
