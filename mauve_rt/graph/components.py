@@ -57,9 +57,11 @@ def resource_key(name: str) -> str:
     return f"resource {name}"
 
 
-def cpus_text(cpus: Iterable[int]) -> str:
-    """`CPU 0, 2`, or `any CPU`: the frame in which components of the same CPUs stand."""
-    return f"CPU {', '.join(map(str, cpus))}" if (cpus := sorted(cpus)) else "any CPU"
+def cpus_text(cpus: Iterable[int] | None) -> str:
+    """`CPU 0, 2`, or `any CPU`: the frame in which components of the same CPUs stand; empty: not known."""
+    if cpus is None:
+        return ""
+    return f"CPU {', '.join(map(str, sorted(cpus)))}" if cpus else "any CPU"
 
 
 def _component(told: Any, measured: Measured | None) -> Node:
@@ -70,7 +72,7 @@ def _component(told: Any, measured: Measured | None) -> Node:
         lines.append(f"load {measured.text}")
     if lonely := [port.name for port in told.ports if not port.resource]:
         lines.append(f"not connected: {', '.join(lonely)}")
-    properties = [text.partition("=") for text in getattr(told, "properties", ())]
+    properties = map(_property, getattr(told, "properties", ()))
     parts = {"shell": told.shell, "core": told.core, "fsm": told.fsm}
     return Node(
         key=component_key(told.name),
@@ -78,13 +80,19 @@ def _component(told: Any, measured: Measured | None) -> Node:
         lines=tuple(filter(None, lines)),
         cluster=cpus_text(told.cpus),
         classes=(HIGH,) if measured is not None and measured.load > _HIGH_LOAD else (),
-        tip="\n".join([told.name, *lines[3:4], *(f"{kind} {name}" for kind, name in parts.items())]),
+        tip="\n".join([told.name, *(f"{kind} {name}" for kind, name in parts.items() if name)]),
         details={
             **{kind: name for kind, name in parts.items() if kind != "core"},
-            **{name: value for name, _, value in properties},
+            **dict(properties),
             "state": str(getattr(told, "state", "")),
         },
     )
+
+
+def _property(told: Any) -> tuple[str, str]:
+    """Name and value: a message has them as one text."""
+    name, _, value = told.partition("=") if isinstance(told, str) else (told.name, "", str(told.value))
+    return name, value
 
 
 def _resource(name: str, told: Any, components: Iterable[Any]) -> Node:

@@ -30,7 +30,7 @@ class Layout(NamedTuple):
     """Over how many ranks arrows of equal nodes reach."""
 
 
-_DOWN, _RIGHT = {"rankdir": "TB", "ranksep": "0.35"}, {"rankdir": "LR", "ranksep": "0.35"}
+_DOWN, _RIGHT = ({"rankdir": direction, "ranksep": "0.35", "pad": "0.15"} for direction in ("TB", "LR"))
 _ROOMY, _DENSE, _ALL_RANKS = {"nodesep": "0.2"}, {"nodesep": "0.1"}, {"newrank": "true"}
 _LAYOUTS = (
     Layout({**_DOWN, **_ROOMY, **_ALL_RANKS}),
