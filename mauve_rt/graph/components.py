@@ -99,13 +99,14 @@ def _resource(name: str, told: Any, components: Iterable[Any]) -> Node:
     users = {cpus_text(one.cpus) for one in components for port in one.ports if port.resource == name}
     names = [(side, getattr(told, side, "")) for side in _ROS_SIDES]
     lines = [name.rpartition("/")[2], *(f"{side} {ros_name}" for side, ros_name in names if ros_name)]
-    facts = [f"kind {told.kind}", f"type {told.type}" if told.type else ""] if told is not None else []
+    details = {"kind": told.kind, "type": told.type} if told is not None else {}
     return Node(
         key=resource_key(name),
         kind="resource",
         lines=tuple(lines),
         cluster=users.pop() if len(users) == 1 else "",
-        tip="\n".join([f"resource {name}", *filter(None, facts)]),
+        tip="\n".join([f"resource {name}", *(f"{fact} {value}" for fact, value in details.items() if value)]),
+        details=details,
     )
 
 

@@ -99,7 +99,11 @@ def _compared(
 
 def _changed(old: _Part, new: _Part) -> _Part:
     """What is after the change, with each line of before that is another one."""
-    if old == new:
+    if isinstance(old, Node) and isinstance(new, Node):
+        new = replace(new, cluster=new.cluster or old.cluster)
+        if (old.lines, old.details) == (new.lines, new.details):
+            return new
+    elif old.lines == new.lines:
         return new
     lines = [
         is_after if is_before == is_after else f"{is_before} \N{RIGHTWARDS ARROW} {is_after}"

@@ -84,6 +84,7 @@ def _laid_out(drawing: Drawing, widest_px: int, tip: str) -> ET.Element:
         "class": "mauve-graph",
         "width": width,
         "height": height,
+        "style": f"width:{width}px;height:{height}px",
         "viewBox": root.get("viewBox", ""),
         "role": "img",
         "aria-label": shown(drawing.title),
