@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from html import escape
 
 from mauve_rt.graph import look
 from mauve_rt.graph.drawing import Drawing, Edge, Node
@@ -124,4 +123,9 @@ def _rows(lines: Sequence[str]) -> Iterator[str]:
     wide = max(map(width_px, lines))
     for line in lines:
         size = f'FIXEDSIZE="TRUE" WIDTH="{wide + 8:.0f}" HEIGHT="{LINE_PX}" ALIGN="LEFT"'
-        yield f"<TR><TD {size}>{escape(line) or ' '}</TD></TR>"
+        yield f"<TR><TD {size}>{_entities(line) or ' '}</TD></TR>"
+
+
+def _entities(line: str) -> str:
+    """Graphviz takes some characters for its own also where HTML does not, as a bracket before a tag."""
+    return "".join(one if one.isalnum() or one in " _" else f"&#{ord(one)};" for one in line)
