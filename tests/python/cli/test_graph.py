@@ -1,11 +1,14 @@
 """`mauve graph` on files and bags: architectures, changes, rules, fsms and models as drawings."""
 
 import re
+import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from page_blocks import blocks
+from readable_drawings import checked_texts
 from synthetic_traces import record
 
 from mauve_rt.cli.completion import complete_executors_and_files
@@ -238,3 +241,19 @@ def test_files_and_folders_are_completed(tmp_path: Path, monkeypatch: pytest.Mon
     monkeypatch.setattr("mauve_rt.cli.completion._known", lambda _executor="": [])
     found = complete_executors_and_files(f"{tmp_path}/r", None)  # type: ignore[arg-type]
     assert found == [f"{tmp_path}/robot.yaml", f"{tmp_path}/run/"]
+
+
+@NEEDS_DOT
+def test_the_commands_of_the_how_to_draw(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    page = (ROOT / "docs/howto/draw_an_architecture.md").read_text(encoding="utf-8")
+    (tmp_path / "mauve_examples").symlink_to(ROOT / "mauve_examples")
+    monkeypatch.chdir(tmp_path)
+    commands = [shlex.split(block.text)[1:] for block in blocks(page) if "mauve_examples" in block.text]
+    assert len(commands) == 3
+    for words in commands:
+        assert main(words) == 0
+        out = words[-1]
+        assert capsys.readouterr() == (f"{out}\n", "")
+        assert checked_texts((tmp_path / out).read_text(encoding="utf-8"))
