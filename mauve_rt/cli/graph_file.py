@@ -13,7 +13,14 @@ from mauve_rt.file_schema.words import did_you_mean
 from mauve_rt.graph.components import architecture_drawing, component_key, resource_key
 from mauve_rt.graph.drawing import Drawing, Edge, Node, compared, merged
 from mauve_rt.graph.fsms import fsm_drawing
-from mauve_rt.model import ArchitectureModel, PluginIndex, build, configure, load_architecture, previewed_states
+from mauve_rt.model import (
+    ArchitectureModel,
+    PluginIndex,
+    build,
+    configure,
+    load_architecture,
+    previewed_states,
+)
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.modelled_parts import add_modelled_parts
 from mauve_rt.model.schema import ResourceModel
@@ -85,7 +92,11 @@ def with_rules(drawing: Drawing, path: Path, topics: Topics) -> Drawing:
     keys = {node.key for node in drawing.nodes}
     for rule in RulesFile(path).rules.rules:
         node = _rule_node(rule)
-        edges = [edge for edge in _rule_edges(rule, node.key, topics) if {edge.start, edge.end} <= keys | {node.key}]
+        edges = [
+            edge
+            for edge in _rule_edges(rule, node.key, topics)
+            if {edge.start, edge.end} <= keys | {node.key}
+        ]
         drawing = drawing.with_more([node], merged(edges))
     return drawing
 
@@ -113,7 +124,9 @@ def _described(model: ArchitectureModel, models: Sequence[PackageModel]) -> Desc
 def _components(model: ArchitectureModel) -> Iterator[Any]:
     for name, one in model.components.items():
         ports = [
-            SimpleNamespace(name=link.port, kind="port", type="", resource=link.resource, service=link.service)
+            SimpleNamespace(
+                name=link.port, kind="port", type="", resource=link.resource, service=link.service
+            )
             for link in model.connections
             if link.component == name
         ]
@@ -130,7 +143,10 @@ def _components(model: ArchitectureModel) -> Iterator[Any]:
 
 
 def _drawing(
-    title: str, model: ArchitectureModel, described: Described, more: Mapping[str, ResourceModel] | None = None
+    title: str,
+    model: ArchitectureModel,
+    described: Described,
+    more: Mapping[str, ResourceModel] | None = None,
 ) -> Drawing:
     resources = {**model.resources, **(more or {})}
     present = [one.name for one in described.resources] or list(model.resources)
@@ -145,7 +161,9 @@ def _resource(name: str, one: ResourceModel, namespace: str) -> Any:
         side = "publishes" if one.topic.direction == "publish" else "subscribes"
         setattr(found, side, full_name(one.topic.name, namespace))
     if one.service is not None:
-        setattr(found, "calls" if one.service.offers is None else "offers", full_name(one.service.name, namespace))
+        setattr(
+            found, "calls" if one.service.offers is None else "offers", full_name(one.service.name, namespace)
+        )
     return found
 
 

@@ -64,4 +64,6 @@ def _methods(one: CoreModel) -> Iterator[str]:
 
 
 def _fsm(name: str, one: FsmModel) -> Node:
-    return Node(key=f"fsm {name}", kind="fsm", lines=(name, ", ".join(one.states)), tip=one.description or name)
+    return Node(
+        key=f"fsm {name}", kind="fsm", lines=(name, ", ".join(one.states)), tip=one.description or name
+    )

@@ -54,7 +54,9 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.graph.svg import GraphError  # noqa: PLC0415
 
     if args.out is not None and args.out.suffix not in _SUFFIXES:
-        print(f"mauve: --out {args.out}: expected a name that ends with {', '.join(_SUFFIXES)}", file=sys.stderr)
+        print(
+            f"mauve: --out {args.out}: expected a name that ends with {', '.join(_SUFFIXES)}", file=sys.stderr
+        )
         return BAD_USAGE
     try:
         text = _writer("" if args.out is None else args.out.suffix)(_drawing(args))
@@ -129,7 +131,9 @@ def _of_files(kinds: "Kinds", args: argparse.Namespace) -> "tuple[Drawing, Any]"
                 return fsm_of_file(path, args.fsm, models), None
             return drawing_of_file(path, models, args.steps)
     if len(models) != 1 or len(kinds) != 1:
-        raise ParameterError("graph: expected an architecture file, a node or a bag beside rules; or one model")
+        raise ParameterError(
+            "graph: expected an architecture file, a node or a bag beside rules; or one model"
+        )
     none = Topics("/", {})
     return (fsm_of_model(models[0], args.fsm) if args.fsm else drawing_of_model(models[0])), none
 
@@ -189,7 +193,15 @@ def _told_fsm(component: Any) -> "Drawing":
         known = installed.get(one.name)
         is_same = known is not None and list(known.successors) == list(one.successors)
         more = ("action", "guards", "duration_text", "event_port") if is_same else ()
-        facts = ("name", "is_initial", "is_wait", "is_event_wait", "duration_ns", "min_interarrival_ns", "wcet_ns")
+        facts = (
+            "name",
+            "is_initial",
+            "is_wait",
+            "is_event_wait",
+            "duration_ns",
+            "min_interarrival_ns",
+            "wcet_ns",
+        )
         states.append(
             SimpleNamespace(
                 successors=list(one.successors),

@@ -46,7 +46,12 @@ def dot_text(
             if node.cluster == title
         ]
         if title:
-            frame = {"label": shown(title), "labeljust": "l", "style": "rounded", "color": look.light("line-strong")}
+            frame = {
+                "label": shown(title),
+                "labeljust": "l",
+                "style": "rounded",
+                "color": look.light("line-strong"),
+            }
             inside.insert(0, f"graph [{_attributes(frame)}]")
             lines += [f"  subgraph cluster_{index} {{", *(f"    {line}" for line in inside), "  }"]
         else:
@@ -116,7 +121,9 @@ def _edge(edge: Edge) -> dict[str, str]:
 
 def _label(lines: Sequence[str]) -> str:
     """The label of an edge: cells of a fixed size, whose text begins at their left."""
-    return f'<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0">{"".join(_rows(lines))}</TABLE>>'
+    return (
+        f'<<TABLE BORDER="0" CELLBORDER="0" CELLSPACING="0" CELLPADDING="0">{"".join(_rows(lines))}</TABLE>>'
+    )
 
 
 def _rows(lines: Sequence[str]) -> Iterator[str]:

@@ -3,14 +3,12 @@
 `components`, `fsms` and their kin make it, `dot`, `mermaid`, `svg` and `page` write it.
 """
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import zip_longest
 from typing import Literal, TypeVar
 
-NodeKind = Literal[
-    "component", "resource", "rule", "start", "execution", "wait", "shell", "core", "fsm"
-]
+NodeKind = Literal["component", "resource", "rule", "start", "execution", "wait", "shell", "core", "fsm"]
 EdgeKind = Literal["data", "rule", "transition", "use"]
 ADDED, REMOVED, CHANGED, HIGH = "added", "removed", "changed", "high"
 """Classes of nodes and edges: differences of two drawings, and a high load."""
@@ -58,6 +56,10 @@ class Drawing:
         return replace(self, nodes=(*self.nodes, *nodes), edges=(*self.edges, *edges))
 
 
+_Part = TypeVar("_Part", Node, Edge)
+_Key = TypeVar("_Key")
+
+
 def merged(edges: Iterable[Edge]) -> tuple[Edge, ...]:
     """Return the edges with one in the place of several that join the same nodes and look the same."""
     found: dict[tuple[str, str, str, tuple[str, ...]], list[Edge]] = {}
@@ -75,26 +77,28 @@ def merged(edges: Iterable[Edge]) -> tuple[Edge, ...]:
 
 def compared(before: Drawing, after: Drawing) -> Drawing:
     """Return one drawing of two, in which each node and edge has the class of its difference."""
-    nodes = _compared(before.nodes, after.nodes, lambda node: node.key)
-    edges = _compared(before.edges, after.edges, lambda edge: (edge.start, edge.end, edge.kind))
-    return replace(after, nodes=nodes, edges=edges)
-
-
-_Part = TypeVar("_Part", Node, Edge)
-
-
-def _compared(
-    before: Sequence[_Part], after: Sequence[_Part], key: Callable[[_Part], object]
-) -> tuple[_Part, ...]:
-    old, new = {key(one): one for one in before}, {key(one): one for one in after}
-    return tuple(
-        replace(new[name], classes=(*new[name].classes, ADDED))
-        if name not in old
-        else replace(old[name], classes=(*old[name].classes, REMOVED))
-        if name not in new
-        else _changed(old[name], new[name])
-        for name in dict.fromkeys([*new, *old])
+    old_nodes, new_nodes = ({node.key: node for node in each.nodes} for each in (before, after))
+    old_edges, new_edges = (
+        {(edge.start, edge.end, edge.kind): edge for edge in each.edges} for each in (before, after)
     )
+    return replace(
+        after,
+        nodes=tuple(_compared(old_nodes, new_nodes)),
+        edges=tuple(_compared(old_edges, new_edges)),
+    )
+
+
+def _compared(before: Mapping[_Key, _Part], after: Mapping[_Key, _Part]) -> Iterator[_Part]:
+    for key, part in after.items():
+        old = before.get(key)
+        yield _with_class(part, ADDED) if old is None else _changed(old, part)
+    for key, part in before.items():
+        if key not in after:
+            yield _with_class(part, REMOVED)
+
+
+def _with_class(part: _Part, css: str) -> _Part:
+    return replace(part, classes=(*part.classes, css))
 
 
 def _changed(old: _Part, new: _Part) -> _Part:
@@ -115,4 +119,4 @@ def _changed(old: _Part, new: _Part) -> _Part:
             for name, value in new.details.items()
             if old.details.get(name) != value
         ]
-    return replace(new, lines=tuple(lines), classes=(*new.classes, CHANGED))
+    return _with_class(replace(new, lines=tuple(lines)), CHANGED)

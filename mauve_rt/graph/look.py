@@ -75,7 +75,9 @@ def graph_css() -> str:
         ".mauve-graph .edge text { paint-order: stroke; stroke: var(--panel); stroke-width: 3px; }",
     ]
     for kind, look in NODE_LOOKS.items():
-        rules.append(f"{_shapes(f'.node.{kind}')} {{ fill: var(--{look.fill}); stroke: var(--{look.stroke}); }}")
+        rules.append(
+            f"{_shapes(f'.node.{kind}')} {{ fill: var(--{look.fill}); stroke: var(--{look.stroke}); }}"
+        )
     for edge_kind, colour in EDGE_COLOURS.items():
         rules += _edge_rules(f".edge.{edge_kind}", colour)
     for css, colour in CLASS_COLOURS.items():
@@ -91,9 +93,7 @@ def graph_css() -> str:
 
 def file_css() -> str:
     """The style sheet within an SVG file: the colours of the reader's theme, without `light-dark()`."""
-    both = [
-        "".join(f" --{name}: {pair[index]};" for name, pair in colours().items()) for index in range(2)
-    ]
+    both = ["".join(f" --{name}: {pair[index]};" for name, pair in colours().items()) for index in range(2)]
     return (
         f":root {{{both[0]} background: var(--page); }}\n"
         f"@media (prefers-color-scheme: dark) {{ :root {{{both[1]} }} }}\n{graph_css()}"

@@ -19,7 +19,8 @@ def page_text(drawing: Drawing) -> str:
         GraphError: Graphviz is not installed, or fails.
     """
     title = escape(plain(drawing.title))
-    present = {css for part in (*drawing.nodes, *drawing.edges) for css in part.classes}
+    classes = [*(node.classes for node in drawing.nodes), *(edge.classes for edge in drawing.edges)]
+    present = {css for each in classes for css in each}
     key = "".join(
         f'<span style="color: var(--{colour})">{css}</span>'
         for css, colour in CLASS_COLOURS.items()

@@ -129,7 +129,9 @@ def _run(program: str, text: str) -> str:
             [program, "-Tsvg"], input=text, capture_output=True, text=True, timeout=_TIMEOUT_S, check=False
         )
     except subprocess.TimeoutExpired:
-        raise GraphError(f"`{program}` of Graphviz gave no layout within {_TIMEOUT_S} s. Draw a smaller part.") from None
+        raise GraphError(
+            f"`{program}` of Graphviz gave no layout within {_TIMEOUT_S} s. Draw a smaller part."
+        ) from None
     if done.returncode or not done.stdout:
         lines = done.stderr.strip().splitlines() or ["no reason given"]
         raise GraphError(f"`{program}` of Graphviz failed: {lines[-1]}. Reinstall it: {INSTALL}")

@@ -109,9 +109,7 @@ def try_change(path: Path, change: Change, model: ArchitectureModel) -> None:
         executor.carry_out(change.steps, dry_run=True)
 
 
-def before_and_after(
-    path: Path, change: Change, model: ArchitectureModel
-) -> tuple[Described, Described]:
+def before_and_after(path: Path, change: Change, model: ArchitectureModel) -> tuple[Described, Described]:
     """The architecture of `model` at its start, and after the transaction of a file.
 
     Raises:

@@ -21,7 +21,12 @@ class Box:
         self.top = self.bottom - 0.8 * size
 
     def meets(self, other: "Box") -> bool:
-        return self.left < other.right and other.left < self.right and self.top < other.bottom and other.top < self.bottom
+        return (
+            self.left < other.right
+            and other.left < self.right
+            and self.top < other.bottom
+            and other.top < self.bottom
+        )
 
 
 def checked_texts(svg: str) -> list[str]:
@@ -32,7 +37,9 @@ def checked_texts(svg: str) -> list[str]:
     assert float(root.get("width", "nan")) == width, "one unit is one pixel"
     found = re.search(r"translate\(([-\d.]+) ([-\d.]+)\)", svg)
     assert found is not None
-    boxes = [Box(one, float(found[1]), float(found[2])) for one in root.iter("{http://www.w3.org/2000/svg}text")]
+    boxes = [
+        Box(one, float(found[1]), float(found[2])) for one in root.iter("{http://www.w3.org/2000/svg}text")
+    ]
     assert boxes
     for box in boxes:
         assert box.size >= SMALLEST_PX

@@ -86,7 +86,9 @@ def labels(dot: str) -> dict[str, str]:
 
 def arrows(dot: str) -> dict[tuple[str, str], str]:
     """The class of each edge, by the first lines of both ends."""
-    names = {number: text.split("\\n")[0] for number, text in re.findall(r'(n\d+) \[id="n\d+", label="(.*?)"', dot)}
+    names = {
+        number: text.split("\\n")[0] for number, text in re.findall(r'(n\d+) \[id="n\d+", label="(.*?)"', dot)
+    }
     found = re.findall(r'(n\d+) -> (n\d+) \[id="e\d+", class="(.*?)"', dot)
     return {(names[start], names[end]): css for start, end, css in found}
 
@@ -127,7 +129,9 @@ def test_steps_are_drawn_with_their_differences(graph: Graph) -> None:
     status, out, err = graph("robot.yaml", "--steps", "steps.yaml")
     assert (status, err) == (0, "")
     found = labels(out)
-    assert found["counter\\nCounter \N{RIGHTWARDS ARROW} PyCounter\\n20 ms, priority 40"] == "component changed"
+    assert (
+        found["counter\\nCounter \N{RIGHTWARDS ARROW} PyCounter\\n20 ms, priority 40"] == "component changed"
+    )
     assert found[r"other\nsubscribes /robot/wanted"] == "resource added"
     assert found[r"set\nsubscribes /robot/set"] == "resource"
     assert arrows(out) == {
@@ -173,7 +177,10 @@ def test_a_model_is_drawn_with_shells_cores_and_fsms(graph: Graph) -> None:
 
 
 @NEEDS_DOT
-@pytest.mark.parametrize(("suffix", "start"), [(".svg", "<?xml"), (".html", "<!DOCTYPE html>"), (".dot", "digraph"), (".mmd", "flowchart")])
+@pytest.mark.parametrize(
+    ("suffix", "start"),
+    [(".svg", "<?xml"), (".html", "<!DOCTYPE html>"), (".dot", "digraph"), (".mmd", "flowchart")],
+)
 def test_the_name_of_the_file_says_its_form(graph: Graph, tmp_path: Path, suffix: str, start: str) -> None:
     out = tmp_path / f"drawing{suffix}"
     assert graph("robot.yaml", "--out", str(out)) == (0, f"{out}\n", "")

@@ -25,7 +25,18 @@ from mauve_rt.graph.page import page_text
 from mauve_rt.graph.svg import GraphError, svg_element, svg_text
 
 NEEDS_DOT = pytest.mark.skipif(shutil.which("dot") is None, reason="no Graphviz")
-HOSTILE = ['a"b', "</text><script>alert(1)</script>", "line\none", "back\\slash\\", "n\\n", "<b>", "&amp;", "\x00\x1b", "]]>", "#quot;"]
+HOSTILE = [
+    'a"b',
+    "</text><script>alert(1)</script>",
+    "line\none",
+    "back\\slash\\",
+    "n\\n",
+    "<b>",
+    "&amp;",
+    "\x00\x1b",
+    "]]>",
+    "#quot;",
+]
 NAMES = st.one_of(st.sampled_from(HOSTILE), st.text(max_size=60))
 
 
@@ -34,8 +45,16 @@ def port(name: str, kind: str, resource: str) -> SimpleNamespace:
     return SimpleNamespace(name=name, kind=kind, type="p/T", resource=resource, service=service)
 
 
-def component(name: str, ports: Iterable[SimpleNamespace], *, cpus: tuple[int, ...] = (0,), **more: Any) -> SimpleNamespace:
-    facts = {"shell": "p/Shell", "core": "p/NavigationCore", "fsm": "p/Fsm", "period_ns": 5_000_000, "priority": 50}
+def component(
+    name: str, ports: Iterable[SimpleNamespace], *, cpus: tuple[int, ...] = (0,), **more: Any
+) -> SimpleNamespace:
+    facts = {
+        "shell": "p/Shell",
+        "core": "p/NavigationCore",
+        "fsm": "p/Fsm",
+        "period_ns": 5_000_000,
+        "priority": 50,
+    }
     return SimpleNamespace(name=name, ports=[*ports], cpus=cpus, **{**facts, **more})
 
 
@@ -65,7 +84,11 @@ def layered(count: int, seed: int) -> Iterator[SimpleNamespace]:
         before = range(max(index // wide - 1, 0) * wide, index // wide * wide)
         inputs = chosen.sample(before, min(len(before), chosen.randint(1, 2)))
         ports = [port(f"input_{number}", "read", f"signal_{one}") for number, one in enumerate(inputs)]
-        yield component(f"component_{index:02}", [*ports, port("output", "write", f"signal_{index}")], cpus=(index // wide % 4,))
+        yield component(
+            f"component_{index:02}",
+            [*ports, port("output", "write", f"signal_{index}")],
+            cpus=(index // wide % 4,),
+        )
 
 
 SHAPES = {
@@ -91,7 +114,13 @@ def test_a_component_has_its_rate_its_cpus_and_its_load() -> None:
     ]
     load = {"control": Measured(0.9, "90 %"), "relay": Measured(0.1, "10 %")}
     control, relay, unknown = architecture_drawing("a", parts, measured=load).nodes
-    assert control.lines == ("control", "NavigationCore", "5 ms, priority 50", "load 90 %", "not connected: in")
+    assert control.lines == (
+        "control",
+        "NavigationCore",
+        "5 ms, priority 50",
+        "load 90 %",
+        "not connected: in",
+    )
     assert (control.cluster, control.classes) == ("CPU 0, 1", ("high",))
     assert (relay.lines[2], relay.cluster, relay.classes) == ("on events, priority 50", "any CPU", ())
     assert (unknown.lines, unknown.cluster) == (("unknown", "NavigationCore"), "")
@@ -112,7 +141,9 @@ def test_arrows_follow_the_data_and_have_the_names_of_ports() -> None:
 
 
 def test_ros_names_stand_at_their_resource() -> None:
-    told = SimpleNamespace(name="pose", kind="shared_data", type="p/T", publishes="/robot/pose", subscribes="")
+    told = SimpleNamespace(
+        name="pose", kind="shared_data", type="p/T", publishes="/robot/pose", subscribes=""
+    )
     (node,) = architecture_drawing("a", [], [told]).nodes
     assert node.lines == ("pose", "publishes /robot/pose")
 
@@ -140,7 +171,12 @@ def test_differences_of_two_drawings_are_marked() -> None:
         "resource new": ("added",),
         "resource old": ("removed",),
     }
-    assert found.nodes[0].lines == ("control", "A \N{RIGHTWARDS ARROW} B", "5 ms, priority 50", "gain 1 \N{RIGHTWARDS ARROW} 2")
+    assert found.nodes[0].lines == (
+        "control",
+        "A \N{RIGHTWARDS ARROW} B",
+        "5 ms, priority 50",
+        "gain 1 \N{RIGHTWARDS ARROW} 2",
+    )
     assert [(edge.start, edge.classes) for edge in found.edges] == [
         ("resource new", ("added",)),
         ("resource old", ("removed",)),
@@ -173,7 +209,14 @@ def test_waits_have_their_times_and_arrows_their_guards() -> None:
         *((), ("Idle", "look", "wcet 2 us"), ("Work", "work"), ("Rest", "2 * unit_ms", "10 ms")),
         *(("Event", "event goal", "at most every 5 ms"), ("End", "forever")),
     ]
-    assert [node.kind for node in drawing.nodes] == ["start", "execution", "execution", "wait", "wait", "wait"]
+    assert [node.kind for node in drawing.nodes] == [
+        "start",
+        "execution",
+        "execution",
+        "wait",
+        "wait",
+        "wait",
+    ]
     assert [(edge.start[6:], edge.end[6:], edge.lines) for edge in drawing.edges[1:]] == [
         *(("Idle", "Work", ("has_work",)), ("Idle", "Rest", ("else",)), ("Work", "Rest", ())),
         *(("Rest", "Idle", ()), ("Event", "Idle", ())),
@@ -230,13 +273,20 @@ def test_any_name_stays_within_its_label_of_mermaid(names: list[str]) -> None:
 @pytest.mark.parametrize("name", HOSTILE)
 def test_dot_reads_a_name_as_it_is(name: str) -> None:
     done = subprocess.run(
-        ["dot", "-Tplain"], input=dot_text(hostile_drawing([name])), capture_output=True, text=True, timeout=60, check=False
+        ["dot", "-Tplain"],
+        input=dot_text(hostile_drawing([name])),
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
     )
     assert done.returncode == 0
     assert "syntax error" not in done.stderr
 
 
-def test_without_graphviz_the_error_says_how_to_install_it(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_graphviz_the_error_says_how_to_install_it(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(GraphError, match="apt-get install graphviz"):
         svg_text(architecture_drawing("a", ring(2)))

@@ -14,7 +14,9 @@ EXAMPLES = Path(__file__).parents[3] / "mauve_examples"
 def test_the_drawing_of_the_mission_is_fig_1(capsys: pytest.CaptureFixture[str]) -> None:
     drawing, _ = drawing_of_file(EXAMPLES / "architecture/robot.yaml", [], None)
     assert capsys.readouterr().err == "", "the parts are installed"
-    rates = {node.lines[0]: node.lines[2].partition(",")[0] for node in drawing.nodes if node.kind == "component"}
+    rates = {
+        node.lines[0]: node.lines[2].partition(",")[0] for node in drawing.nodes if node.kind == "component"
+    }
     assert rates == {
         "robot": "10 ms", "control": "20 ms", "guidance": "100 ms", "mapping": "100 ms", "exploration": "500 ms",
     }  # fmt: skip
@@ -24,7 +26,12 @@ def test_the_drawing_of_the_mission_is_fig_1(capsys: pytest.CaptureFixture[str])
     assert arrows >= {("control", "command"), ("command", "robot"), ("robot", "pose")}
     assert arrows >= {("pose", each) for each in ("control", "guidance", "mapping", "exploration")}
     # goals become targets, and the map is updated by one component
-    assert arrows >= {("exploration", "goal"), ("goal", "guidance"), ("guidance", "target"), ("target", "control")}
+    assert arrows >= {
+        ("exploration", "goal"),
+        ("goal", "guidance"),
+        ("guidance", "target"),
+        ("target", "control"),
+    }
     assert {start for start, end in arrows if end == "map"} == {"mapping"}
     # the exchange with other robots
     assert arrows >= {("inbox", "exploration"), ("exploration", "outbox")}
