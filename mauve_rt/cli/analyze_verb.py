@@ -9,6 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mauve_rt.cli.bag_arguments import is_bag
 from mauve_rt.cli.verb import BAD_USAGE, NOT_PROVED, OK, REFUSED
 from mauve_rt.counts import counted
 from mauve_rt.unfinished import beside
@@ -135,7 +136,7 @@ def _machines(target: str, models: Sequence[Path]) -> "tuple[list[Machine], int]
     path = Path(target)
     if not path.exists() and target.startswith("/"):
         return _of_node(target), 1
-    if path.is_dir() or path.suffix in (".mcap", ".db3"):
+    if is_bag(path):
         return _of_bag(path), 1
     return _of_file(path, models)
 

@@ -35,4 +35,4 @@ def one_bag(path: Path) -> Path:
 
 def is_bag(path: Path) -> bool:
     """Tell whether a bag is meant rather than another file."""
-    return (path.is_dir() and not (path / "model.yaml").exists()) or path.suffix in (".mcap", ".db3")
+    return path.is_dir() or path.suffix in (".mcap", ".db3")

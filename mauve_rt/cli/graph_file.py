@@ -1,4 +1,4 @@
-"""What `mauve graph` draws of files: architectures with their rules, steps and models; fsms of their components."""
+"""Drawings of architecture files, with rules, steps and models; and of the fsms of their components."""
 
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence

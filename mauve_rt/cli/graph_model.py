@@ -1,4 +1,4 @@
-"""What `mauve graph` draws of a model: shells with ports, cores with algorithms, fsms; or one fsm."""
+"""Drawings of a model: shells with ports, cores with algorithms, fsms; or one fsm."""
 
 from collections.abc import Iterator
 

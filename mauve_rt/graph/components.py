@@ -1,4 +1,4 @@
-"""The drawing of an architecture as Fig. 1 of the paper has it: components by CPU, resources, ports as arrows."""
+"""The drawing of an architecture, as Fig. 1 of the paper: components by CPU, resources, ports as arrows."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -33,8 +33,9 @@ def architecture_drawing(
 
     Args:
         title: of the drawing.
-        components: ComponentInfo messages, or descriptions with the same fields; a period of None is not known.
-        resources: ResourceInfo messages, or descriptions with the same fields. Others are drawn by their name.
+        components: ComponentInfo messages, or descriptions with the same fields. A period or CPUs of None
+            are not known.
+        resources: ResourceInfo messages, or descriptions with the same fields. Others have their name only.
         measured: facts of a recorded run by component.
     """
     found = list(components)

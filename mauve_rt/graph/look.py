@@ -1,6 +1,6 @@
 """The look of each kind of node and edge: a shape, and colours by their names in `colours.css`.
 
-Graphviz takes the light colours as attributes. In a browser the style sheet has the last word, in light and in dark.
+Graphviz takes the light colours as attributes. In a browser the style sheet decides, in light and in dark.
 """
 
 import re
@@ -71,7 +71,7 @@ def graph_css() -> str:
         ".mauve-graph text { fill: var(--ink); }",
         ".mauve-graph .node text ~ text, .mauve-graph .cluster text { fill: var(--muted); }",
         f".mauve-graph .node text:first-of-type {{ font-size: {NAME_PX}px; font-weight: 640; }}",
-        ".mauve-graph .cluster > path, .mauve-graph .cluster > polygon { fill: none; stroke: var(--line-strong); }",
+        f"{_shapes('.cluster')} {{ fill: none; stroke: var(--line-strong); }}",
         ".mauve-graph .edge text { paint-order: stroke; stroke: var(--panel); stroke-width: 3px; }",
     ]
     for kind, look in NODE_LOOKS.items():

@@ -1,6 +1,6 @@
 """A drawing in the language of Mermaid, which GitHub and GitLab draw in Markdown."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from mauve_rt.graph import look
 from mauve_rt.graph.drawing import Drawing, Edge
@@ -17,6 +17,13 @@ def mermaid_text(drawing: Drawing) -> str:
 def _lines(drawing: Drawing) -> Iterator[str]:
     yield "flowchart TB"
     numbers = {node.key: f"n{index}" for index, node in enumerate(drawing.nodes)}
+    yield from _nodes(drawing, numbers)
+    for edge in drawing.edges:
+        yield f"  {numbers[edge.start]} {_arrow(edge)} {numbers[edge.end]}"
+    yield from _styles(drawing)
+
+
+def _nodes(drawing: Drawing, numbers: Mapping[str, str]) -> Iterator[str]:
     for index, title in enumerate(dict.fromkeys(node.cluster for node in drawing.nodes)):
         indent = "  "
         if title:
@@ -29,8 +36,9 @@ def _lines(drawing: Drawing) -> Iterator[str]:
                 yield f"{indent}{numbers[node.key]}{opening}{_quoted(node.lines)}{closing}:::{css}"
         if title:
             yield "  end"
-    for edge in drawing.edges:
-        yield f"  {numbers[edge.start]} {_arrow(edge)} {numbers[edge.end]}"
+
+
+def _styles(drawing: Drawing) -> Iterator[str]:
     for kind in dict.fromkeys(node.kind for node in drawing.nodes):
         yield f"  classDef {kind} {_colours(look.NODE_LOOKS[kind].stroke, look.NODE_LOOKS[kind].fill)}"
     for css, colour in look.CLASS_COLOURS.items():

@@ -1,4 +1,4 @@
-"""Whether each text of a drawing in SVG can be read: large enough, within the drawing, and on no other text."""
+"""Whether each text of a drawing can be read: large enough, within the drawing, on no other text."""
 
 import re
 from itertools import combinations

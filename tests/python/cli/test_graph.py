@@ -190,18 +190,27 @@ def test_the_name_of_the_file_says_its_form(graph: Graph, tmp_path: Path, suffix
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["robot.yaml", "--out", "a.png"], "--out a.png: expected a name that ends with .svg, .html, .dot, .mmd"),
-        (["robot.yaml", "--out", "/no/such/a.dot"], "graph /no/such/a.dot: cannot be written (No such file or directory)"),
-        (["robot.yaml", "--fsm", "countr"], "robot.yaml: component 'countr' is unknown; did you mean counter?"),
+        (
+            ["robot.yaml", "--out", "a.png"],
+            "--out a.png: expected a name that ends with .svg, .html, .dot, .mmd",
+        ),
+        (["robot.yaml", "--out", "/no/such/a.dot"], "/no/such/a.dot: cannot be written (No such file"),
+        (
+            ["robot.yaml", "--fsm", "countr"],
+            "robot.yaml: component 'countr' is unknown; did you mean counter?",
+        ),
         ([str(MODEL), "--fsm", "GuidanceFsn"], "fsm 'GuidanceFsn' is unknown; did you mean GuidanceFsm?"),
         ([str(MODEL), "--steps", "steps.yaml"], "graph: --steps needs an architecture file"),
         (["steps.yaml"], "steps.yaml is a file of steps; write --steps"),
         (["rules.yaml"], "graph: expected an architecture file, a node or a bag"),
-        (["robot.yaml", "rules.yaml", "--fsm", "counter"], "graph: --fsm draws no rules; leave rules.yaml out"),
+        (
+            ["robot.yaml", "rules.yaml", "--fsm", "counter"],
+            "graph: --fsm draws no rules; leave rules.yaml out",
+        ),
         (["missing.yaml"], "missing.yaml"),
         (["robot.yaml", "--steps", "missing.yaml"], "missing.yaml"),
     ],
-)  # fmt: skip
+)
 def test_bad_usage_is_one_sentence(graph: Graph, words: list[str], message: str) -> None:
     status, out, err = graph(*words)
     assert (status, out) == (2, "")

@@ -78,8 +78,8 @@ def lonely(count: int) -> Iterator[SimpleNamespace]:
 
 
 def layered(count: int, seed: int) -> Iterator[SimpleNamespace]:
-    """Sensors, filters, planners, controllers and drivers, in six layers; each reads one or two of the layer before."""
-    chosen, wide = random.Random(seed), count // 6
+    """From sensors to drivers in six layers; each reads one or two signals of the layer before."""
+    chosen, wide = random.Random(seed), count // 6  # noqa: S311 - no secret
     for index in range(count):
         before = range(max(index // wide - 1, 0) * wide, index // wide * wide)
         inputs = chosen.sample(before, min(len(before), chosen.randint(1, 2)))
@@ -298,7 +298,7 @@ def test_an_error_of_graphviz_is_one_sentence(monkeypatch: pytest.MonkeyPatch, t
     program.write_text("#!/bin/sh\necho 'no such library' >&2\nexit 1\n", encoding="utf-8")
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{tmp_path}:/usr/bin:/bin")
-    with pytest.raises(GraphError, match="no such library. Reinstall it"):
+    with pytest.raises(GraphError, match=r"no such library\. Reinstall it"):
         svg_text(architecture_drawing("a", ring(2)))
 
 

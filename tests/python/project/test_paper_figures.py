@@ -18,8 +18,12 @@ def test_the_drawing_of_the_mission_is_fig_1(capsys: pytest.CaptureFixture[str])
         node.lines[0]: node.lines[2].partition(",")[0] for node in drawing.nodes if node.kind == "component"
     }
     assert rates == {
-        "robot": "10 ms", "control": "20 ms", "guidance": "100 ms", "mapping": "100 ms", "exploration": "500 ms",
-    }  # fmt: skip
+        "robot": "10 ms",
+        "control": "20 ms",
+        "guidance": "100 ms",
+        "mapping": "100 ms",
+        "exploration": "500 ms",
+    }
     names = {node.key: node.lines[0] for node in drawing.nodes}
     arrows = {(names[edge.start], names[edge.end]) for edge in drawing.edges}
     # velocity commands in, the position out
