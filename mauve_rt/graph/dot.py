@@ -56,8 +56,11 @@ def dot_text(
             lines += [f"  subgraph cluster_{index} {{", *(f"    {line}" for line in inside), "  }"]
         else:
             lines += [f"  {line}" for line in inside]
+    ends = {(edge.start, edge.end) for edge in drawing.edges}
     for index, edge in enumerate(drawing.edges):
         reach = {"minlen": str(1 + index % spread)} if spread > 1 else {}
+        if (edge.end, edge.start) in ends and edge.start > edge.end:
+            reach |= {"tailport": "e", "headport": "e"}  # else it lies on the arrow of the other direction
         values = _attributes({"id": f"e{index}", **_edge(edge), **reach})
         lines.append(f"  {numbers[edge.start]} -> {numbers[edge.end]} [{values}]")
     return "\n".join([*lines, "}", ""])

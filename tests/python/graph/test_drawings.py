@@ -223,6 +223,13 @@ def test_waits_have_their_times_and_arrows_their_guards() -> None:
     ]
 
 
+def test_two_opposite_arrows_do_not_lie_on_each_other() -> None:
+    states = [state("A", ["B", "C"], is_initial=True), state("B", ["A"]), state("C", ["B"])]
+    lines = dot_text(fsm_drawing("f", states)).splitlines()
+    apart = [line.split("[")[0].strip() for line in lines if "tailport" in line]
+    assert apart == ["n2 -> n1"], "start is n0, A is n1, B is n2"
+
+
 def test_each_look_has_a_colour_in_light_and_in_dark() -> None:
     names = {*EDGE_COLOURS.values(), *CLASS_COLOURS.values()}
     names |= {name for look in NODE_LOOKS.values() for name in (look.fill, look.stroke)}
