@@ -92,21 +92,21 @@ def _drawing(args: argparse.Namespace) -> "Drawing":
     from mauve_rt.cli.graph_file import Topics, with_rules  # noqa: PLC0415
     from mauve_rt.model.file_kinds import FileKind, file_kind  # noqa: PLC0415
 
-    told = [one for one in args.subject if _is_node(one) or is_bag(Path(one))]
-    kinds = {Path(one): file_kind(one) for one in args.subject if one not in told}
+    described = [one for one in args.subject if _is_node(one) or is_bag(Path(one))]
+    kinds = {Path(one): file_kind(one) for one in args.subject if one not in described}
     rules = [path for path, kind in kinds.items() if kind is FileKind.RULES]
     if steps := [path for path, kind in kinds.items() if kind is FileKind.STEPS]:
         raise ParameterError(f"graph: {steps[0]} is a file of steps; write --steps {steps[0]}")
     is_file = FileKind.ARCHITECTURE in kinds.values()
     if args.steps is not None and not is_file:
         raise ParameterError("graph: --steps needs an architecture file; an executor is drawn as it is")
-    if len(told) + [*kinds.values()].count(FileKind.ARCHITECTURE) > 1:
+    if len(described) + [*kinds.values()].count(FileKind.ARCHITECTURE) > 1:
         raise ParameterError("graph: expected one architecture, found several; draw one after the other")
     if args.fsm and rules:
         raise ParameterError(f"graph: --fsm draws no rules; leave {rules[0]} out")
     topics = Topics("/", {})
-    if told:
-        drawing, topics = _told(told[0], args.fsm)
+    if described:
+        drawing, topics = _described(described[0], args.fsm)
     else:
         drawing, topics = _of_files(kinds, args)
     for path in rules:
@@ -138,7 +138,7 @@ def _of_files(kinds: "Kinds", args: argparse.Namespace) -> "tuple[Drawing, Any]"
     return (fsm_of_model(models[0], args.fsm) if args.fsm else drawing_of_model(models[0])), none
 
 
-def _told(subject: str, fsm: str) -> "tuple[Drawing, Any]":
+def _described(subject: str, fsm: str) -> "tuple[Drawing, Any]":
     """Of an executor that runs, or of a bag."""
     from mauve_rt.cli.graph_file import Topics, require  # noqa: PLC0415
     from mauve_rt.graph.components import architecture_drawing  # noqa: PLC0415
@@ -147,7 +147,7 @@ def _told(subject: str, fsm: str) -> "tuple[Drawing, Any]":
     if fsm:
         by_name = {one.name: one for one in components}
         require(fsm, by_name, f"{subject}: component")
-        return _told_fsm(by_name[fsm]), None
+        return _described_fsm(by_name[fsm]), None
     topics = {one.subscribes: one.name for one in resources if one.subscribes}
     namespace = subject.rpartition("/")[0] or "/"
     return architecture_drawing(subject, components, resources), Topics(namespace, topics)
@@ -156,11 +156,12 @@ def _told(subject: str, fsm: str) -> "tuple[Drawing, Any]":
 def _of_node(node: str) -> tuple[list[Any], list[Any]]:
     from mauve_msgs.srv import ListComponents  # noqa: PLC0415
     from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.trace.reading.architecture import ComponentInfo  # noqa: PLC0415
 
     name = absolute_name(node)
     with connected(first=True) as client:
         reply = client.call(ListComponents, f"{name}/list_components", ListComponents.Request())
-    return list(reply.components), list(reply.resources)
+    return [*map(ComponentInfo.of_message, reply.components)], list(reply.resources)
 
 
 def _of_bag(path: Path) -> tuple[list[Any], list[Any]]:
@@ -173,7 +174,7 @@ def _of_bag(path: Path) -> tuple[list[Any], list[Any]]:
     return list(trace.architecture), []
 
 
-def _told_fsm(component: Any) -> "Drawing":
+def _described_fsm(component: Any) -> "Drawing":
     """With the guards and actions of the fsm of that name, where it is installed and has the same states."""
     from types import SimpleNamespace  # noqa: PLC0415
 

@@ -8,8 +8,7 @@ from mauve_rt.counts import duration
 from mauve_rt.graph.drawing import HIGH, Drawing, Edge, Node, merged
 
 _HIGH_LOAD = 0.7
-_PORT_KINDS = {1: "read", 2: "write", 3: "call", 4: "event"}  # mauve_msgs/msg/PortInfo
-_ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
+ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ def architecture_drawing(
 
     Args:
         title: of the drawing.
-        components: ComponentInfo messages, or descriptions with the same fields. A period or CPUs of None
+        components: trace.reading's ComponentInfo, or descriptions with its fields. A period or CPUs of None
             are not known.
         resources: ResourceInfo messages, or descriptions with the same fields. Others have their name only.
         measured: facts of a recorded run by component.
@@ -65,42 +64,50 @@ def cpus_text(cpus: Iterable[int] | None) -> str:
     return f"CPU {', '.join(map(str, sorted(cpus)))}" if cpus else "any CPU"
 
 
-def _component(told: Any, measured: Measured | None) -> Node:
-    rate = duration(told.period_ns) if told.period_ns else "on events" if told.period_ns == 0 else ""
-    facts = [rate, f"priority {told.priority}" if told.priority else ""]
-    lines = [told.name, told.core.rpartition("/")[2], ", ".join(filter(None, facts))]
+def _component(described: Any, measured: Measured | None) -> Node:
+    rate = (
+        duration(described.period_ns)
+        if described.period_ns
+        else "on events"
+        if described.period_ns == 0
+        else ""
+    )
+    facts = [rate, f"priority {described.priority}" if described.priority else ""]
+    lines = [described.name, described.core.rpartition("/")[2], ", ".join(filter(None, facts))]
     if measured is not None:
         lines.append(f"load {measured.text}")
-    if lonely := [port.name for port in told.ports if not port.resource]:
+    if lonely := [port.name for port in described.ports if not port.resource]:
         lines.append(f"not connected: {', '.join(lonely)}")
-    properties = map(_property, getattr(told, "properties", ()))
-    parts = {"shell": told.shell, "core": told.core, "fsm": told.fsm}
+    properties = map(_property, getattr(described, "properties", ()))
+    parts = {"shell": described.shell, "core": described.core, "fsm": described.fsm}
     return Node(
-        key=component_key(told.name),
+        key=component_key(described.name),
         kind="component",
         lines=tuple(filter(None, lines)),
-        cluster=cpus_text(told.cpus),
+        cluster=cpus_text(described.cpus),
         classes=(HIGH,) if measured is not None and measured.load > _HIGH_LOAD else (),
-        tip="\n".join([told.name, *(f"{kind} {name}" for kind, name in parts.items() if name)]),
+        tip="\n".join([described.name, *(f"{kind} {name}" for kind, name in parts.items() if name)]),
         details={
             **{kind: name for kind, name in parts.items() if kind != "core"},
             **dict(properties),
-            "state": str(getattr(told, "state", "")),
+            "state": str(getattr(described, "state", "")),
         },
     )
 
 
-def _property(told: Any) -> tuple[str, str]:
+def _property(described: Any) -> tuple[str, str]:
     """Name and value: a message has them as one text."""
-    name, _, value = told.partition("=") if isinstance(told, str) else (told.name, "", str(told.value))
+    name, _, value = (
+        described.partition("=") if isinstance(described, str) else (described.name, "", str(described.value))
+    )
     return name, value
 
 
-def _resource(name: str, told: Any, components: Iterable[Any]) -> Node:
+def _resource(name: str, described: Any, components: Iterable[Any]) -> Node:
     users = {cpus_text(one.cpus) for one in components for port in one.ports if port.resource == name}
-    names = [(side, getattr(told, side, "")) for side in _ROS_SIDES]
+    names = [(side, getattr(described, side, "")) for side in ROS_SIDES]
     lines = [name.rpartition("/")[2], *(f"{side} {ros_name}" for side, ros_name in names if ros_name)]
-    details = {"kind": told.kind, "type": told.type} if told is not None else {}
+    details = {"kind": described.kind, "type": described.type} if described is not None else {}
     return Node(
         key=resource_key(name),
         kind="resource",
@@ -113,11 +120,10 @@ def _resource(name: str, told: Any, components: Iterable[Any]) -> Node:
 
 def _edge(component: Any, port: Any) -> Edge:
     """Along the data: a component takes values from a resource, or gives some to it."""
-    kind = _PORT_KINDS.get(port.kind, str(port.kind))
-    takes = kind in ("read", "event") or port.service.startswith(("read", "get"))
+    takes = port.kind in ("read", "event") or port.service.startswith(("read", "get"))
     ends = [component_key(component.name), resource_key(port.resource)]
     start, end = reversed(ends) if takes else ends
-    tip = f"{component.name}.{port.name} ({kind}), {port.resource}.{port.service}"
+    tip = f"{component.name}.{port.name} ({port.kind}), {port.resource}.{port.service}"
     return Edge(
         start=start,
         end=end,

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 from itertools import zip_longest
 from typing import Any
 
+from mauve_rt.analysis.machines import FOREVER_NS
 from mauve_rt.counts import duration
 from mauve_rt.graph.drawing import Drawing, Edge, Node
 
-_FOREVER_NS = 2**63 - 1
 _START = "start"
 
 
@@ -27,32 +27,38 @@ def _key(name: str) -> str:
     return f"state {name}"
 
 
-def _state(told: Any) -> Node:
-    lines = [told.name, *(_wait(told) if told.is_wait else [getattr(told, "action", "")])]
-    if not told.is_wait and told.wcet_ns:
-        lines.append(f"wcet {duration(told.wcet_ns)}")
+def _state(described: Any) -> Node:
+    lines = [described.name, *(_wait(described) if described.is_wait else [getattr(described, "action", "")])]
+    if not described.is_wait and described.wcet_ns:
+        lines.append(f"wcet {duration(described.wcet_ns)}")
     return Node(
-        key=_key(told.name), kind="wait" if told.is_wait else "execution", lines=tuple(filter(None, lines))
+        key=_key(described.name),
+        kind="wait" if described.is_wait else "execution",
+        lines=tuple(filter(None, lines)),
     )
 
 
-def _wait(told: Any) -> Iterator[str]:
+def _wait(described: Any) -> Iterator[str]:
     """Its time, as it is written and in ns; of a wait for an event the port and the limits."""
-    if told.is_event_wait:
-        yield f"event {getattr(told, 'event_port', '')}"
-        yield f"at most every {duration(told.min_interarrival_ns)}"
-    if told.duration_ns != _FOREVER_NS:
-        yield getattr(told, "duration_text", "")
-        yield f"{'timeout ' if told.is_event_wait else ''}{duration(told.duration_ns)}"
-    elif not told.is_event_wait:
+    if described.is_event_wait:
+        yield f"event {getattr(described, 'event_port', '')}"
+        yield f"at most every {duration(described.min_interarrival_ns)}"
+    if described.duration_ns != FOREVER_NS:
+        yield getattr(described, "duration_text", "")
+        yield f"{'timeout ' if described.is_event_wait else ''}{duration(described.duration_ns)}"
+    elif not described.is_event_wait:
         yield "forever"
 
 
-def _transitions(told: Any) -> Iterator[Edge]:
-    guards: Sequence[str] = getattr(told, "guards", ())
-    for number, (to, guard) in enumerate(zip_longest(told.successors, guards, fillvalue=""), start=1):
+def _transitions(described: Any) -> Iterator[Edge]:
+    guards: Sequence[str] = getattr(described, "guards", ())
+    for number, (to, guard) in enumerate(zip_longest(described.successors, guards, fillvalue=""), start=1):
         text = guard or ("else" if guards else "")
-        tip = f"{told.name} to {to}" + (f", guard {number} of {len(guards)}: {guard}" if guard else "")
+        tip = f"{described.name} to {to}" + (f", guard {number} of {len(guards)}: {guard}" if guard else "")
         yield Edge(
-            start=_key(told.name), end=_key(to), kind="transition", lines=(text,) if text else (), tip=tip
+            start=_key(described.name),
+            end=_key(to),
+            kind="transition",
+            lines=(text,) if text else (),
+            tip=tip,
         )

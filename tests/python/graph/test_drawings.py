@@ -148,16 +148,6 @@ def test_ros_names_stand_at_their_resource() -> None:
     assert node.lines == ("pose", "publishes /robot/pose")
 
 
-def test_numbers_of_port_kinds_are_those_of_the_message() -> None:
-    text = (Path(__file__).parents[3] / "mauve_msgs/msg/PortInfo.msg").read_text(encoding="utf-8")
-    numbers = {int(number): name.lower() for name, number in re.findall(r"uint8 ([A-Z]+)=(\d+)", text)}
-    for number, name in numbers.items():
-        told = component("c", [port("p", name, "r")])
-        message = component("c", [SimpleNamespace(**{**vars(told.ports[0]), "kind": number})])
-        assert architecture_drawing("a", [told]).edges == architecture_drawing("a", [message]).edges
-        assert f"({name})" in architecture_drawing("a", [message]).edges[0].tip
-
-
 def test_differences_of_two_drawings_are_marked() -> None:
     def drawing(core: str, resource: str, properties: list[str]) -> Drawing:
         one = component("control", [port("in", "read", resource)], core=core, properties=properties)
