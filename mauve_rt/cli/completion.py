@@ -80,7 +80,8 @@ def _offered(prefix: str, names: Iterable[str]) -> list[str]:
 
 def _executor_of(parsed_args: argparse.Namespace) -> list["CachedExecutor"]:
     """The executor on the command line, if it is known."""
-    name = getattr(parsed_args, "executor", None)
+    subjects = getattr(parsed_args, "subject", None) or [None]  # of a verb that also takes files
+    name = getattr(parsed_args, "executor", subjects[0])
     if not isinstance(name, str):
         return []
     absolute = "/" + name.strip("/")

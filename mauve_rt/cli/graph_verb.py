@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.arguments import absolute_name
 from mauve_rt.cli.bag_arguments import is_bag
-from mauve_rt.cli.completion import complete_executors_and_files, completed_by
+from mauve_rt.cli.completion import complete_components, complete_executors_and_files, completed_by
 from mauve_rt.cli.verb import BAD_USAGE, OK
 from mauve_rt.errors import ArchitectureFileError, ParameterError
 
@@ -31,9 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "add their rules; models beside an architecture file give it parts that are not installed",
     )
     completed_by(subjects, complete_executors_and_files)
-    parser.add_argument(
+    component = parser.add_argument(
         "--fsm", default="", metavar="COMPONENT", help="draw the fsm of this component; of a MODEL, this fsm"
     )
+    completed_by(component, complete_components)
     parser.add_argument(
         "--steps",
         type=Path,

@@ -1,17 +1,20 @@
 """`mauve graph` on files and bags: architectures, changes, rules, fsms and models as drawings."""
 
+import argparse
 import re
 import shlex
 import shutil
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from page_blocks import blocks
 from readable_drawings import checked_texts
 from synthetic_traces import record
 
-from mauve_rt.cli.completion import complete_executors_and_files
+from mauve_rt.cli.completion import complete_components, complete_executors_and_files
+from mauve_rt.cli.completion_cache import CachedComponent
 from mauve_rt.cli.main import main
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -249,6 +252,15 @@ def test_a_bag_is_drawn_as_it_was_recorded(graph: Graph) -> None:
     assert any(label.startswith(r"metronome\nMetronome\n5 ms") for label in labels(out))
     status, out, _ = graph(bag, "--fsm", "metronome")
     assert {"Tick", "Beat"} <= {label.split("\\n")[0] for label in labels(out)}
+
+
+def test_components_of_an_executor_are_completed(monkeypatch: pytest.MonkeyPatch) -> None:
+    components = [CachedComponent(name=name) for name in ("control", "guidance")]
+    executor = SimpleNamespace(name="/robot/executor", components=components)
+    monkeypatch.setattr("mauve_rt.cli.completion._known", lambda _executor="": [executor])
+    words = argparse.Namespace(subject=["robot/executor"])
+    assert complete_components("", words) == ["control", "guidance"]
+    assert complete_components("", argparse.Namespace(subject=["robot.yaml"])) == []
 
 
 def test_files_and_folders_are_completed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
