@@ -11,6 +11,7 @@ missing_system_packages() {
   command -v cmake >/dev/null || echo cmake
   command -v ninja >/dev/null || echo ninja-build
   command -v python3 >/dev/null || echo python3
+  command -v dot >/dev/null || echo graphviz
   [[ -e /usr/include/yaml-cpp/yaml.h ]] || echo libyaml-cpp-dev
   [[ -e /usr/include/png.h ]] || echo libpng-dev
   [[ -e /usr/include/openssl/ssl.h ]] || echo libssl-dev

@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mauve_rt.cli.bag_arguments import is_bag
 from mauve_rt.cli.verb import BAD_USAGE, FORECAST, NOT_PROVED, OK, REFUSED, REFUTED
 from mauve_rt.counts import counted
 from mauve_rt.unfinished import beside
@@ -117,7 +118,7 @@ def main(args: argparse.Namespace) -> int:
         return BAD_USAGE
     model = _model(args.target, args.model)
     components = model.components
-    bag = args.budget_from or (Path(args.target) if _is_bag(Path(args.target)) else None)
+    bag = args.budget_from or (Path(args.target) if is_bag(Path(args.target)) else None)
     statistics = _statistics(bag) if bag is not None else {}
     measured = _measured(statistics)
     if args.budget_from is not None:
@@ -239,11 +240,7 @@ def _model(target: str, models: Sequence[Path]) -> _Model:
     path = Path(target)
     if not path.exists() and target.startswith("/"):
         return _of_node(target)
-    return _of_bag(path) if _is_bag(path) else _of_file(path, models)
-
-
-def _is_bag(path: Path) -> bool:
-    return path.is_dir() or path.suffix in (".mcap", ".db3")
+    return _of_bag(path) if is_bag(path) else _of_file(path, models)
 
 
 def _of_file(path: Path, models: Sequence[Path]) -> _Model:

@@ -31,3 +31,8 @@ def one_bag(path: Path) -> Path:
         found = ", ".join(map(str, bags))
         raise TraceError(f"bag {path}: expected one bag, found a folder of {len(bags)}; name one of {found}")
     return bags[0]
+
+
+def is_bag(path: Path) -> bool:
+    """Tell whether a bag is meant rather than another file."""
+    return path.is_dir() or path.suffix in (".mcap", ".db3")

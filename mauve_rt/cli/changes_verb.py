@@ -44,8 +44,8 @@ def main(args: argparse.Namespace) -> int:
 
 def change_lines(reply: Any, executor: str) -> Iterator[str]:
     """What a ListChanges reply says, in words."""
-    from mauve_rt.cli.views import duration  # noqa: PLC0415
     from mauve_rt.control.open_changes import done_with, in_hook, in_state  # noqa: PLC0415 - it loads messages
+    from mauve_rt.counts import duration  # noqa: PLC0415
     from mauve_rt.interfaces.changes import PHASES  # noqa: PLC0415
 
     for change in reply.changes:

@@ -37,6 +37,15 @@ def complete_executors(prefix: str, parsed_args: argparse.Namespace, **_: Any) -
     return _offered(prefix, names)
 
 
+def complete_executors_and_files(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
+    """Executors' nodes, and files and folders."""
+    folder = prefix[: prefix.rfind("/") + 1]
+    found: list[str] = []
+    with contextlib.suppress(OSError), os.scandir(folder or ".") as entries:
+        found = [f"{folder}{entry.name}{'/' if entry.is_dir() else ''}" for entry in entries]
+    return [*complete_executors(prefix, parsed_args), *_offered(prefix, found)]
+
+
 def complete_components(prefix: str, parsed_args: argparse.Namespace, **_: Any) -> list[str]:
     """Components of the executor on the command line."""
     return _offered(prefix, [each.name for one in _executor_of(parsed_args) for each in one.components])
@@ -71,7 +80,8 @@ def _offered(prefix: str, names: Iterable[str]) -> list[str]:
 
 def _executor_of(parsed_args: argparse.Namespace) -> list["CachedExecutor"]:
     """The executor on the command line, if it is known."""
-    name = getattr(parsed_args, "executor", None)
+    subjects = getattr(parsed_args, "subject", None) or [None]  # of a verb that also takes files
+    name = getattr(parsed_args, "executor", subjects[0])
     if not isinstance(name, str):
         return []
     absolute = "/" + name.strip("/")

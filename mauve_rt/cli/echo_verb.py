@@ -140,7 +140,7 @@ class _Text:
         self._told_old = False
 
     def show(self, sample: Sample, before: Sample | None) -> None:
-        from mauve_rt.cli.views import duration  # noqa: PLC0415
+        from mauve_rt.counts import duration  # noqa: PLC0415
 
         fields = _fields(sample, self._field)  # first: a bad --field is reported at once
         is_new = bool(sample.writes) and (before is None or before.writes != sample.writes)

@@ -9,9 +9,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from mauve_rt.cli.views import console, duration
+from mauve_rt.cli.views import console
 from mauve_rt.control.state_age import in_words
-from mauve_rt.counts import counted
+from mauve_rt.counts import counted, duration
+from mauve_rt.graph.components import ROS_SIDES
 
 # As mauve_msgs/msg/ComponentInfo.
 STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}
@@ -24,7 +25,6 @@ _HOLDERS = {
 }
 _STYLES = {"RUNNING": "green", "FAULTED": "bold red", "STOPPED": "yellow"}
 _WAIT_FREE_KINDS = ("shared_data", "latest_value", "ring_buffer")  # the other kinds have a lock, or know best
-_ROS_SIDES = ("publishes", "subscribes", "calls", "offers")  # fields of mauve_msgs/msg/ResourceInfo
 
 
 def print_components(reply: Any, out: Console | None = None) -> None:
@@ -167,7 +167,7 @@ def _lonely(on_ros: Mapping[str, str], connected: set[str]) -> dict[str, str]:
 
 
 def _ros_names(resource: Any) -> str:
-    names = [(side, getattr(resource, side)) for side in _ROS_SIDES]
+    names = [(side, getattr(resource, side)) for side in ROS_SIDES]
     names += [("mirrors", topic) for topic in resource.mirrors]
     return "\n".join(f"[dim]{side}[/] {name}" for side, name in names if name)
 

@@ -156,7 +156,8 @@ def _state(state: "DescribedState") -> dict[str, Any]:
 
 def _print_parts(parts: Iterable[Mapping[str, Any]]) -> None:
     from mauve_rt.cli.tables import dict_table  # noqa: PLC0415 - rich takes its time to load
-    from mauve_rt.cli.views import console, duration  # noqa: PLC0415
+    from mauve_rt.cli.views import console  # noqa: PLC0415
+    from mauve_rt.counts import duration  # noqa: PLC0415
 
     out = console()
     for part in parts:

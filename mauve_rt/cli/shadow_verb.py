@@ -86,8 +86,8 @@ def _print(shadow: Any) -> None:
     from rich import box  # noqa: PLC0415 - takes its time to load
     from rich.table import Table  # noqa: PLC0415
 
-    from mauve_rt.cli.views import console, duration  # noqa: PLC0415
-    from mauve_rt.counts import counted  # noqa: PLC0415
+    from mauve_rt.cli.views import console  # noqa: PLC0415
+    from mauve_rt.counts import counted, duration  # noqa: PLC0415
 
     out = console()
     verdict = verdict_word(shadow.verdict)

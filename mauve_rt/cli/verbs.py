@@ -14,6 +14,7 @@ from mauve_rt.cli import (
     doctor_verb,
     echo_verb,
     generate_verb,
+    graph_verb,
     mirror_verb,
     model_verb,
     new_verb,
@@ -497,6 +498,12 @@ VERBS = (
         "check architecture, rules and steps files without starting anything",
         check_verb.add_arguments,
         check_verb.main,
+    ),
+    Verb(
+        "graph",
+        "draw an architecture, a change of it, or an fsm",
+        graph_verb.add_arguments,
+        graph_verb.main,
     ),
     Verb(
         "analyze",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.plain_output import beneath, plain
 from mauve_rt.cli.verb import OK, REFUSED
+from mauve_rt.counts import duration
 
 if TYPE_CHECKING:  # rich takes its time to load, and JSON or a line of text have no use for it
     from rich.console import Console
@@ -122,14 +123,3 @@ def event_line(event: Any) -> str:
     why = f" because {event.cause}" if event.cause else ""
     stamp = f"{event.stamp.sec}.{event.stamp.nanosec // 1_000_000:03d}"
     return f"{stamp} {event.request}{who}{why}: {outcome}"
-
-
-def duration(nanoseconds: int) -> str:
-    """`5 us`, `2.5 ms`, `1 s`; `-` for none."""
-    size = abs(nanoseconds)
-    if size == 0:
-        return "-"
-    for unit, factor in (("s", 1_000_000_000), ("ms", 1_000_000), ("us", 1_000)):
-        if size >= factor:
-            return f"{nanoseconds / factor:.4g} {unit}"
-    return f"{nanoseconds} ns"

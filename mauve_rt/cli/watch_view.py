@@ -12,8 +12,8 @@ from rich.table import Table
 from rich.text import Text
 
 from mauve_rt.cli.list_view import STATES
-from mauve_rt.cli.views import duration
 from mauve_rt.cli.watched import Figures, Followed, WatchedExecutor
+from mauve_rt.counts import duration
 from mauve_rt.supervision.truth import truth_word
 
 SORTED_BY = ("file", "wake-up", "response", "execution", "overruns", "state")

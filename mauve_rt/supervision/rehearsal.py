@@ -4,8 +4,15 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NamedTuple
 
-from mauve_rt._kernel import Overlays, OverlaySpec, Simulation
+from mauve_rt._kernel import (
+    ComponentDescription,
+    Overlays,
+    OverlaySpec,
+    ResourceDescription,
+    Simulation,
+)
 from mauve_rt.control import requests
 from mauve_rt.control.control import Control
 from mauve_rt.control.no_ros import NoRos
@@ -19,6 +26,13 @@ from mauve_rt.supervision.rule_hearing import own_leaves, unobservable
 from mauve_rt.supervision.rule_names import full_name, leaf_findings
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.supervision.when import When
+
+
+class Described(NamedTuple):
+    """The parts of an architecture at one moment."""
+
+    components: Sequence[ComponentDescription]
+    resources: Sequence[ResourceDescription]
 
 
 class RefusedStepError(Exception):
@@ -44,6 +58,10 @@ class Rehearsal:
     def periods_s(self) -> Mapping[str, float]:
         """Of every component, s."""
         return {each.name: each.period_ns / 1e9 for each in self._runtime.components()}
+
+    def described(self) -> Described:
+        """Every component and resource as it is now."""
+        return Described(self._runtime.components(), self._runtime.architecture.resources())
 
     def is_so(self, steps: Sequence[Step]) -> bool:
         """Whether all that these steps set is so already."""
@@ -87,13 +105,30 @@ def try_change(path: Path, change: Change, model: ArchitectureModel) -> None:
     Raises:
         ArchitectureFileError: at the step that it would refuse.
     """
-    with rehearsal(model) as executor:
-        try:
-            executor.carry_out(change.steps, dry_run=True)
-        except RefusedStepError as error:
-            file = YamlFile(path)
-            problem = file.problem(place_of_step(file, error.index), str(error))
-            raise ArchitectureFileError(path, [problem]) from None
+    with rehearsal(model) as executor, _refusals_at(path):
+        executor.carry_out(change.steps, dry_run=True)
+
+
+def before_and_after(path: Path, change: Change, model: ArchitectureModel) -> tuple[Described, Described]:
+    """The architecture of `model` at its start, and after the transaction of a file.
+
+    Raises:
+        ArchitectureFileError: at the step that the executor would refuse.
+    """
+    with rehearsal(model) as executor, _refusals_at(path):
+        before = executor.described()
+        executor.carry_out(change.steps)
+        return before, executor.described()
+
+
+@contextmanager
+def _refusals_at(path: Path) -> Iterator[None]:
+    try:
+        yield
+    except RefusedStepError as error:
+        file = YamlFile(path)
+        problem = file.problem(place_of_step(file, error.index), str(error))
+        raise ArchitectureFileError(path, [problem]) from None
 
 
 def try_rule(file: RulesFile, index: int, model: ArchitectureModel) -> None:

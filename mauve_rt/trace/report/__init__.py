@@ -3,7 +3,7 @@
     write_report(Path("report.html"), mauve_rt.trace.open("bag"))
 
 `analysis` computes everything once; `verdict` with its `sentences`, `key_figures`, `timeline`, `comparison`,
-`distributions`, `architecture_graph` and `tables` are the page's parts; `blocks`, `svg`, `histograms` what
+`distributions`, `architecture_section` and `tables` are the page's parts; `blocks`, `svg`, `histograms` what
 they are made of.
 `runs` compares two runs, on a page of its own.
 The timeline is drawn by the scripts in `static`, from `columns` that hold what `detail` keeps.

@@ -5,6 +5,7 @@ from html import escape
 from importlib.resources import files
 from pathlib import Path
 
+from mauve_rt.graph.look import colours_css, graph_css
 from mauve_rt.trace.report.blocks import Section, attribute
 
 STYLES = ("report.css", "figures.css", "timeline.css")
@@ -32,7 +33,7 @@ def page(
     links = "".join(
         f'<a href="#{attribute(one.anchor)}">{escape(one.heading)}</a>' for one in sections if one.anchor
     )
-    style = "\n".join(_static(name) for name in STYLES)
+    style = "\n".join([colours_css(), *map(_static, STYLES), graph_css()])
     script = "\n".join(_static(name) for name in SCRIPTS)
     return (
         '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">\n'

@@ -7,7 +7,7 @@ from typing import Any
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.report.analysis import Analysis, analyse
-from mauve_rt.trace.report.architecture_graph import architecture_section
+from mauve_rt.trace.report.architecture_section import architecture_section
 from mauve_rt.trace.report.blocks import Card, Section, cards
 from mauve_rt.trace.report.comparison import reconfigurations_section
 from mauve_rt.trace.report.decisions import decisions_section

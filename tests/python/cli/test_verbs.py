@@ -11,6 +11,7 @@ import pytest
 from mauve_msgs.msg import ComponentInfo, ReconfigurationEvent, StepReport
 from mauve_rt.cli import views
 from mauve_rt.cli.main import build_parser, main
+from mauve_rt.counts import duration
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model.steps import load_change
 
@@ -165,7 +166,7 @@ def test_reports_and_events_in_words() -> None:
     [(0, "-"), (999, "999 ns"), (1_000, "1 us"), (2_500_000, "2.5 ms"), (-3_000_000_000, "-3 s")],
 )
 def test_durations(nanoseconds: int, text: str) -> None:
-    assert views.duration(nanoseconds) == text
+    assert duration(nanoseconds) == text
 
 
 def test_messages_as_json() -> None:

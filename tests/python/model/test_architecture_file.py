@@ -8,7 +8,6 @@ from bad_architectures import BAD, GOOD
 from mauve_rt._kernel import Architecture, PluginRegistry
 from mauve_rt.errors import ArchitectureFileError, MauveError
 from mauve_rt.model import Overrides, build, configure, load_architecture
-from mauve_rt.model.graph import architecture_graph
 
 REGISTRY = PluginRegistry()
 
@@ -189,12 +188,3 @@ def test_bad_overrides(
     with pytest.raises(ArchitectureFileError) as caught:
         _load(tmp_path, GOOD, overrides=Overrides(properties=given))
     assert message in str(caught.value)
-
-
-def test_graph_follows_the_data(tmp_path: Path) -> None:
-    path = tmp_path / "robot.yaml"
-    path.write_text(GOOD, encoding="utf-8")
-    graph = architecture_graph(load_architecture(path))
-    assert set(graph.edges()) == {("source", "count"), ("count", "sink")}
-    assert graph.nodes["queue"]["kind"] == "resource"
-    assert graph.edges["count", "sink", 0]["port"] == "set"

@@ -18,6 +18,7 @@ README = "python/project/test_readme_examples.py::test_"
 TUTORIALS = "docs/tutorials/"
 TUTORIALS_RUN_BY = "ros/test_tutorials.py::test_the_page_does_what_it_says"
 HOWTO_ANALYZE = "python/cli/test_analyze_pages.py::test_the_commands_of_the_how_to_print_what_it_shows"
+DRAWN = "python/cli/test_graph.py::test_the_commands_of_the_how_to_draw"
 HOWTO = "python/project/test_howto_pages.py::test_"
 OVERRUN = f"{HOWTO}the_commands_that_find_an_overrun_print_what_it_shows"
 HOWTO_ROS = "ros/executor/test_howto_pages.py::test_"
@@ -60,6 +61,11 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
     "docs/howto/develop_live.md": {
         "--watch src/my_robot": ("ros/cli/test_dev.py::test_the_commands_of_the_page",),
         "--once": ("ros/cli/test_dev.py::test_the_commands_of_the_page",),
+    },
+    "docs/howto/draw_an_architecture.md": {
+        "--out robot.svg": (DRAWN,),
+        "--out rules.svg": (DRAWN,),
+        "--out guidance.svg": (DRAWN,),
     },
     "docs/howto/find_an_overrun.md": {
         "--suppose guidance.Planning=120ms --witness preempted": (OVERRUN,),

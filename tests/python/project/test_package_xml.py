@@ -50,6 +50,7 @@ CMAKE_PACKAGES: dict[str, set[str]] = {
     "mauve_rt": set(),
     "pybind11": {"pybind11-dev"},
 }
+PROGRAMS = {"dot": "graphviz"}  # that sources run, and rosdep's keys
 TOOLS = {"cmake", "ament_cmake", "rosidl_default_generators"}
 GENERATED = {"rosidl_default_runtime"}  # what the generated code of mauve_msgs needs to run
 PLUGINS = {"python3-pytest-timeout"}  # configured in pyproject.toml, imported by nobody
@@ -119,6 +120,12 @@ def _ros2_commands() -> set[str]:
     }
 
 
+def _programs() -> set[str]:
+    """Packages of other programs that sources run."""
+    text = "\n".join(file.read_text(encoding="utf-8") for file in _files(PRODUCT, "*.py"))
+    return {package for program, package in PROGRAMS.items() if f'_run("{program}", ' in text}
+
+
 def _found_by_cmake(folders: tuple[str, ...]) -> set[str]:
     keys: set[str] = set()
     for file in _files(folders, "CMakeLists.txt", "*.cmake"):
@@ -130,7 +137,7 @@ def _found_by_cmake(folders: tuple[str, ...]) -> set[str]:
 
 
 def test_what_runs_is_listed_exactly() -> None:
-    needed = _keys(_modules(PRODUCT)) | _types_by_name() | _ros2_commands() | GENERATED
+    needed = _keys(_modules(PRODUCT)) | _types_by_name() | _ros2_commands() | _programs() | GENERATED
     libraries = _found_by_cmake(PRODUCT)
     listed = _depends(ROOT, "depend", "exec_depend")
     assert needed - listed == set(), "add to package.xml"

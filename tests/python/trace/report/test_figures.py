@@ -1,4 +1,4 @@
-"""Figures of the report: graphs without overlap, histograms that hold every value, ticks that tell apart."""
+"""Figures of the report: histograms that hold every value, ticks that tell apart."""
 
 import numpy as np
 import pytest
@@ -10,41 +10,12 @@ from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.comparison import reconfigurations_section
 from mauve_rt.trace.report.histograms import bins_of
-from mauve_rt.trace.report.layers import Size, place
 from mauve_rt.trace.report.scales import linear_ticks, log_ticks
 from mauve_rt.trace.report.units import counted, digits, listed, share_text, tick_texts, time_text
-
-NODES = [f"n{index}" for index in range(12)]
-EDGES = st.lists(st.tuples(st.sampled_from(NODES), st.sampled_from(NODES)), max_size=30)
 
 
 def plain(text: str) -> str:
     return text.replace("\N{NARROW NO-BREAK SPACE}", " ").replace("\N{MICRO SIGN}", "u")
-
-
-@given(EDGES, st.sets(st.sampled_from(NODES), max_size=3))
-def test_boxes_of_a_graph_do_not_overlap_and_every_edge_has_a_way(
-    edges: list[tuple[str, str]], hubs: set[str]
-):
-    sizes = {node: Size(60 + 20 * (index % 3), 30) for index, node in enumerate(NODES)}
-    placed = place(sizes, edges, hubs=hubs)
-    assert set(placed.middles) == set(NODES)
-    assert set(placed.routes) == {(a, b) for a, b in edges if a != b}
-    boxes = [(*placed.middles[node], *sizes[node]) for node in NODES]
-    for index, (x, y, width, height) in enumerate(boxes):
-        assert width / 2 - 1e-6 <= x <= placed.size.width - width / 2 + 1e-6
-        for other_x, other_y, other_width, other_height in boxes[index + 1 :]:
-            beside = abs(x - other_x) >= (width + other_width) / 2
-            assert beside or abs(y - other_y) >= (height + other_height) / 2
-    for (start, end), points in placed.routes.items():
-        assert (points[0], points[-1]) == (placed.middles[start], placed.middles[end])
-        heights = [y for _, y in points]
-        assert heights in (sorted(heights), sorted(heights, reverse=True))
-
-
-def test_a_chain_is_drawn_downwards():
-    placed = place({node: Size(10, 10) for node in "abc"}, [("a", "b"), ("b", "c"), ("c", "a")])
-    assert [placed.middles[node][1] for node in "abc"] == sorted(placed.middles[node][1] for node in "abc")
 
 
 @given(st.lists(st.integers(0, 10**10), min_size=1, max_size=200))

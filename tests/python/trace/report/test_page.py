@@ -1,6 +1,7 @@
 """The page as a whole: whatever the trace, it is one file, safe, and not too large."""
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -175,6 +176,27 @@ def test_any_trace_gives_a_page(trace: Trace, tmp_path: Path):
     assert all(name in page for name in trace.components)
     shown = re.sub(r"<script>.*</script>", "", page, flags=re.DOTALL)
     assert not re.search(r"\b(?:NaN|nan|inf|Infinity)\b", shown)
+
+
+@pytest.mark.skipif(shutil.which("dot") is None, reason="no Graphviz")
+def test_the_architecture_has_loads_and_ports(tmp_path: Path):
+    trace = replace(periodic_trace(["c0", "c1"], 5), architecture=architecture(3))
+    page = page_of(trace, tmp_path)
+    begin = page.index('<svg class="mauve-graph"')
+    drawing = page[begin : page.index("</svg>", begin)]
+    texts = re.findall("<text[^>]*>([^<]*)</text>", drawing)
+    assert {"c0", "c1", "c2", "data0", "map", "out", "CPU 0, 1"} <= set(texts)
+    assert sum(text.startswith("load ") for text in texts) == 3
+    assert 'data-tip="c0.out (write), data0.write, p/T"' in drawing
+    assert ".mauve-graph .node.component" in page
+    assert "--panel: light-dark(" in page
+
+
+def test_without_graphviz_the_page_says_how_to_install_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    page = page_of(eventful_trace(), tmp_path)
+    assert "<h2>Architecture</h2>" in page
+    assert "No graph: `dot` of Graphviz is not installed. Install it: apt-get install graphviz" in page
 
 
 def test_a_sporadic_component_is_named_so(tmp_path: Path):
