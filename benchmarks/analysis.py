@@ -112,6 +112,7 @@ def _wait(name: str, time_ns: int, successor: str) -> State:
         latest_ns=time_ns,
         is_event_wait=False,
         successors=(successor,),
+        time=ExecutionTime(0, "declared"),  # of its guards
     )
 
 
