@@ -14,12 +14,12 @@ from typing import Protocol
 
 import networkx as nx
 
+from mauve_rt.analysis.critical_section import CriticalSection
 from mauve_rt.analysis.errors import AnalysisError
-from mauve_rt.analysis.task import CriticalSection
 
 
 class LockUser(Protocol):
-    """A task that locks resources: a sporadic `Task`, or a component of `digraph_times`."""
+    """A task that locks resources: a component of `digraph_times`."""
 
     @property
     def name(self) -> str:

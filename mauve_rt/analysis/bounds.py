@@ -4,11 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Self
 
+from mauve_rt.analysis.critical_section import CriticalSection
 from mauve_rt.analysis.digraph import DigraphTask, digraph_of, period_of
 from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime, digraph_times
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 from mauve_rt.analysis.obstacles import obstacles
-from mauve_rt.analysis.task import CriticalSection
 
 
 @dataclass(frozen=True)
@@ -79,17 +79,23 @@ def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, B
     """
     times: dict[str, DigraphTimes] = {}
     for here in by_cpu(subjects):
-        found = digraph_times([_component(subject) for subject in here], jitter_ns=wakeup_ns)
+        found = digraph_times([_component(subject, wakeup_ns) for subject in here])
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
     return {
         subject.name: _bound(subject, subjects, times) for subject in subjects if subject.machine.is_component
     }
 
 
-def _component(subject: Subject) -> Component:
+def _component(subject: Subject, wakeup_ns: int) -> Component:
     machine = subject.machine
-    states = tuple((state.name, state.time.ns or 0) for state in machine.states if not state.is_wait)
-    return Component(subject.task, machine.priority, subject.sections, bool(machine.clients), states)
+    return Component(
+        subject.task,
+        machine.priority,
+        jitter_ns=wakeup_ns,
+        sections=subject.sections,
+        waits_for_services=bool(machine.clients),
+        states=tuple((state.name, state.time.ns or 0) for state in machine.states if not state.is_wait),
+    )
 
 
 def by_cpu(subjects: Sequence[Subject]) -> list[list[Subject]]:

@@ -13,8 +13,8 @@ from fractions import Fraction
 from typing import NamedTuple
 
 from mauve_rt.analysis.digraph import DigraphTask, Job
+from mauve_rt.analysis.fixed_point import MOST_STEPS, UnboundedError
 from mauve_rt.analysis.machines import FOREVER_NS
-from mauve_rt.analysis.window import MOST_STEPS, UnboundedError
 
 _MOST_PATHS = 100  # that are looked at, of a task
 
@@ -131,6 +131,8 @@ class Demand(Staircase):
 
     def of_each_path(self, until_ns: int, *, most: int) -> list[Staircase] | None:
         """One for each path that no other one dominates, up to then; None: there are more than `most`."""
+        if len(self._task.jobs) == 1:
+            return [self]
         until_ns += self._jitter_ns
         found: list[Staircase] = []
         for count, releases in enumerate(_all_paths(self._task, until_ns)):

@@ -1,9 +1,18 @@
 """Response times of digraph tasks on one CPU under SCHED_FIFO: each job of each path in a busy window.
 
-What `window` is for sporadic tasks; the same conventions of intervals, and of equal priorities. Where the
-paths of all tasks that delay a job are few, each combination of them is tried: exact. Else of each such task
-the most that it can ask for counts, which may be of one path at one instant and of another at the next:
-sound, and more than one run can show.
+A sporadic task is a digraph with one vertex. Where the paths of all tasks that delay a job are few, each
+combination of them is tried: exact. Else of each such task the most that it can ask for counts, which may be
+of one path at one instant and of another at the next: sound, and more than one run can show.
+
+Time 0 is the start of the busy window. Intervals of execution are half-open: a job that finishes at F
+occupied [0, F), and a job of higher priority that is released at F itself does not delay it. Intervals
+before a start are closed: a job that starts at S has waited for all jobs of higher and equal priority
+released in [0, S].
+
+Under SCHED_FIFO, a job of equal priority that is released later does not preempt. That does not make jobs
+first in, first out: the kernel queues threads, and a thread keeps its place until it sleeps. A thread with
+a backlog goes on with jobs that are released after those of the threads behind it. So all jobs of equal
+priority released up to the start count, not only those released up to the job's own release.
 
 Components share resources, whose mutexes inherit priorities: `blocking` bounds how long components of lower
 priority run in a busy window. A thread that waits for a lock or for a ROS service leaves the kernel's queue,
@@ -11,36 +20,60 @@ so for a component that does so all others of its priority count as higher.
 
 An execution state is bounded as well, from its begin to its end: by the same demands.
 
-Source: Stigge, Yi, "Combinatorial Abstraction Refinement for Feasibility Analysis of Static Priorities",
-Real-Time Systems 51, 2015: its abstract test and its exact one, without the refinement between the two.
+Sources: Lehoczky, "Fixed priority scheduling of periodic task sets with arbitrary deadlines", RTSS 1990
+(busy window, every job of it); Tindell, Burns, Wellings, "An extendible approach for analyzing fixed
+priority hard real-time tasks", Real-Time Systems 6, 1994 (release jitter, blocking); Stigge, Yi,
+"Combinatorial Abstraction Refinement for Feasibility Analysis of Static Priorities", Real-Time Systems 51,
+2015: its abstract test and its exact one, without the refinement between the two.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass, field
 from fractions import Fraction
 from itertools import product, takewhile
 
 from mauve_rt.analysis.blocking import blocking_ns, shares_a_resource
+from mauve_rt.analysis.critical_section import CriticalSection
 from mauve_rt.analysis.demand import Demand, Path, Staircase, cost_of, paths, utilization_of
 from mauve_rt.analysis.digraph import DigraphTask, Job
-from mauve_rt.analysis.task import CriticalSection
-from mauve_rt.analysis.window import UnboundedError, least_time_ns
+from mauve_rt.analysis.errors import AnalysisError
+from mauve_rt.analysis.fixed_point import UnboundedError, least_time_ns
 
 _MOST_COMBINATIONS = 64
 
 
 @dataclass(frozen=True)
 class Component:
-    """A digraph task, the cost of each job known, with a thread of its own."""
+    """A digraph task, the cost of each job known, with a thread of its own.
+
+    Raises:
+        AnalysisError: a section is inside a resource that no section of the component is of.
+
+    """
 
     task: DigraphTask
     priority: int
+    _: KW_ONLY
+    jitter_ns: int = 0
+    """The longest delay from the arrival of a job to its release."""
     sections: tuple[CriticalSection, ...] = ()
     """Of any of its jobs."""
     waits_for_services: bool = False
     """Its jobs wait for ROS services: these waits are in their costs."""
     states: tuple[tuple[str, int], ...] = ()
     """Name and cost of those to bound each by itself."""
+
+    def __post_init__(self) -> None:
+        locked = {section.resource for section in self.sections}
+        for section in self.sections:
+            if section.inside and section.inside not in locked:
+                raise AnalysisError(
+                    f"component {self.name}, section of {section.resource}",
+                    "inside",
+                    expected="a resource that the component locks",
+                    found=section.inside,
+                    remedy=f"Add the section of {section.inside}",
+                )
 
     @property
     def name(self) -> str:
@@ -74,16 +107,16 @@ class DigraphTimes:
         return None if self.reason else max((one.response_ns for one in self.jobs), default=0)
 
 
-def digraph_times(components: Sequence[Component], *, jitter_ns: int = 0) -> dict[str, DigraphTimes]:
-    """The bounds of all components of one CPU, by name; each release is delayed by up to `jitter_ns`.
+def digraph_times(components: Sequence[Component]) -> dict[str, DigraphTimes]:
+    """The bounds of all components of one CPU, by name.
 
     Raises:
         AnalysisError: as for `ceilings`.
 
     """
-    demands = {one.name: Demand(one.task, jitter_ns=jitter_ns) for one in components}
+    demands = {one.name: Demand(one.task, jitter_ns=one.jitter_ns) for one in components}
     loads = {one.name: utilization_of(one.task) for one in components}
-    return {one.name: _times(one, components, demands, loads, jitter_ns) for one in components}
+    return {one.name: _times(one, components, demands, loads) for one in components}
 
 
 def _times(
@@ -91,32 +124,31 @@ def _times(
     components: Sequence[Component],
     demands: Mapping[str, Demand],
     loads: Mapping[str, Fraction],
-    jitter_ns: int,
 ) -> DigraphTimes:
-    higher = [other.name for other in components if other.priority > one.priority]
-    equal = [other.name for other in components if other.priority == one.priority and other is not one]
+    higher = [other for other in components if other.priority > one.priority]
+    equal = [other for other in components if other.priority == one.priority and other is not one]
     if one.waits_for_services or shares_a_resource(one, components):
         higher, equal = [*higher, *equal], []
-    load = sum((loads[name] for name in (*higher, *equal, one.name)), start=Fraction(0))
+    level = (one, *higher, *equal)
+    load = sum((loads[each.name] for each in level), start=Fraction(0))
     blocked_ns = blocking_ns(one, components)
-    if load > 1 or (load == 1 and (blocked_ns or jitter_ns)):
+    if load > 1 or (load == 1 and (blocked_ns or any(each.jitter_ns for each in level))):
         more = "" if load > 1 else ", and blocking or late wake-ups come on top"
         reason = f"the utilization at this priority is {float(load):.4g}{more}: nothing is left"
         return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
     try:
-        level = _Level(
+        window = _Window(
             demands[one.name],
-            [demands[name] for name in higher],
-            [demands[name] for name in equal],
+            [demands[other.name] for other in higher],
+            [demands[other.name] for other in equal],
             blocking_ns=blocked_ns,
         )
-        end_ns = level.window_ns
         longest: dict[Job, int] = {}
-        for path in _within(one.task, end_ns + jitter_ns):
-            arrival_ns = path.release_ns - jitter_ns
-            response_ns = level.finish_ns(path) - arrival_ns
+        for path in _within(one.task, window.length_ns + one.jitter_ns):
+            arrival_ns = path.release_ns - one.jitter_ns
+            response_ns = window.finish_ns(path) - arrival_ns
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
-        walls_ns = {name: level.wall_ns(cost_ns) for name, cost_ns in one.states}
+        walls_ns = {name: window.wall_ns(cost_ns) for name, cost_ns in one.states}
     except UnboundedError as reason:
         return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
     jobs = tuple(JobTime(job, longest[job]) for job in one.task.jobs)
@@ -128,19 +160,19 @@ def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:
     return takewhile(lambda path: path.release_ns < end_ns, paths(task))
 
 
-class _Level:
-    """What can delay the jobs of a task."""
+class _Window:
+    """The longest busy window of a task, and what delays its jobs there."""
 
     def __init__(
         self, own: Demand, higher: Sequence[Demand], equal: Sequence[Demand], *, blocking_ns: int
     ) -> None:
         everything = (own, *higher, *equal)
-        self.window_ns = least_time_ns(
+        self.length_ns = least_time_ns(
             lambda length_ns: blocking_ns + sum(one.in_ns(length_ns) for one in everything), 1
         )
-        """The longest busy window: the least L > 0 with blocking + the demand of all in [0, L) <= L."""
+        """The least L > 0 with blocking + the demand of all in [0, L) <= L."""
         self._higher, self._blocking_ns = tuple(higher), blocking_ns
-        each = _of_each_path((*higher, *equal), self.window_ns)
+        each = _of_each_path((*higher, *equal), self.length_ns)
         self._delays = [_Delay(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
 
     def finish_ns(self, path: Path) -> int:
@@ -180,7 +212,7 @@ class _Delay:
     blocking_ns: int
 
     def finish_ns(self, path: Path) -> int:
-        """As _Level's."""
+        """As the window's."""
         equal_ns = 0
         if self.equal:
             before_ns = self.blocking_ns + path.work_ns - cost_of(path.job)

@@ -1,6 +1,6 @@
 """Response times by the package response-time-analysis (pyRTA), for comparison.
 
-pyRTA measures from the release, `Task` from the arrival: the first release of a busy window comes a whole
+pyRTA measures from the release, `digraph_times` from the arrival: the first release of a busy window comes a whole
 jitter after its arrival, the later ones come without delay. With jitter below the period, one job is
 released at offset 0.
 """
@@ -10,14 +10,13 @@ from random import Random
 
 from response_time_analysis import model
 from response_time_analysis.analysis import fifo, fp
+from sporadic_tasks import SporadicTask, response_times
 from task_sets import MS, waters_set, with_jitter, with_one_resource
-
-from mauve_rt.analysis import Task, response_times
 
 IDEAL = model.IdealProcessor()
 
 
-def fixed_priority_ns(tasks: list[Task], index: int) -> int | None:
+def fixed_priority_ns(tasks: list[SporadicTask], index: int) -> int | None:
     """The bound of one task, all others of its priority counted as higher; at most one resource is locked."""
     ceiling = max((task.priority for task in tasks if task.sections), default=0)
     blocks = tasks[index].priority <= ceiling
@@ -30,12 +29,12 @@ def fixed_priority_ns(tasks: list[Task], index: int) -> int | None:
     return max(response + (0 if offset else jitter_ns) for offset, _, response in found.search_space or ())
 
 
-def fifo_ns(tasks: list[Task]) -> int | None:
+def fifo_ns(tasks: list[SporadicTask]) -> int | None:
     """The bound, from the release, of every task: one priority, and jobs are first in, first out."""
     return fifo.rta(model.taskset([_mapped(task, blocks=False) for task in tasks]), IDEAL).response_time_bound
 
 
-def _mapped(task: Task, *, blocks: bool) -> model.Task:
+def _mapped(task: SporadicTask, *, blocks: bool) -> model.Task:
     cost = model.WCET(task.cost_ns)
     length_ns = max((section.length_ns for section in task.sections), default=0)
     execution: model.PreemptionModel = model.FullyPreemptive(cost)
@@ -56,7 +55,7 @@ class _Section(model.FloatingNonPreemptive):
         pass
 
 
-def random_set(seed: int) -> list[Task]:
+def random_set(seed: int) -> list[SporadicTask]:
     """Distinct priorities in random order, half of the sets with jitter, half with a shared resource."""
     random = Random(seed)  # noqa: S311 - no cryptography
     tasks = waters_set(

@@ -6,7 +6,7 @@ from random import Random
 
 from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step
 
-from mauve_rt.analysis import CriticalSection
+from mauve_rt.analysis.critical_section import CriticalSection
 from mauve_rt.analysis.digraph import DigraphTask, Job
 
 

@@ -7,11 +7,16 @@ one with a lowered priority to the head. A thread with a released job goes on wi
 
 import heapq
 from collections import defaultdict, deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import count, pairwise
 from random import Random
+from types import MappingProxyType
+from typing import Protocol
 
-from mauve_rt.analysis import CriticalSection, Task
+from sporadic_tasks import SporadicTask
+
+from mauve_rt.analysis.critical_section import CriticalSection
 
 RUN, LOCK, UNLOCK, WAIT = range(4)
 Step = tuple[int, int | str]  # RUN and WAIT: ns; LOCK and UNLOCK: the resource
@@ -26,9 +31,19 @@ class Release:
     program: list[Step]
 
 
+class Scheduled(Protocol):
+    """A task or component, as far as the scheduler knows it."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def priority(self) -> int: ...
+
+
 @dataclass(eq=False)
 class Thread:
-    task: Task
+    task: Scheduled
     jobs: deque[Release]
     steps: deque[Step] = field(default_factory=deque)
     held: list[str] = field(default_factory=list)
@@ -38,13 +53,13 @@ class Thread:
     in_job: bool = False
 
 
-def simulate(tasks: list[Task], releases: dict[str, list[Release]]) -> dict[str, int]:
+def simulate(tasks: Sequence[Scheduled], releases: dict[str, list[Release]]) -> dict[str, int]:
     """The longest response time (ns) of each task, from arrival to finish, until all jobs are done."""
     return _Cpu(tasks, releases).run()
 
 
 class _Cpu:
-    def __init__(self, tasks: list[Task], releases: dict[str, list[Release]]) -> None:
+    def __init__(self, tasks: Sequence[Scheduled], releases: dict[str, list[Release]]) -> None:
         self.threads = [Thread(task, deque(releases[task.name]), priority=task.priority) for task in tasks]
         self.now = 0
         self.queues: dict[int, deque[Thread]] = defaultdict(deque)
@@ -167,18 +182,23 @@ class _Cpu:
                 self.queues[priority].appendleft(thread)
 
 
-def longest_simulated(random: Random, tasks: list[Task], *, runs: int = 4) -> dict[str, int]:
+Waits = Mapping[str, Sequence[int]]  # of a task: the length (ns) of each wait of a job
+
+
+def longest_simulated(
+    random: Random, tasks: list[SporadicTask], *, runs: int = 4, waits: Waits = MappingProxyType({})
+) -> dict[str, int]:
     """The longest response time (ns) of each task in some runs with random releases and programs."""
     longest = {task.name: 0 for task in tasks}
     for _ in range(runs):
-        releases = random_releases(random, tasks, jobs=8, full=random.random() < 0.8)
+        releases = random_releases(random, tasks, jobs=8, full=random.random() < 0.8, waits=waits)
         for name, response_ns in simulate(tasks, releases).items():
             longest[name] = max(longest[name], response_ns)
     return longest
 
 
 def random_releases(
-    random: Random, tasks: list[Task], *, jobs: int, full: bool = True
+    random: Random, tasks: list[SporadicTask], *, jobs: int, full: bool, waits: Waits
 ) -> dict[str, list[Release]]:
     """Releases that respect the tasks' parameters: many at the same instant, some late, some jobs shorter."""
     found: dict[str, list[Release]] = {}
@@ -191,7 +211,7 @@ def random_releases(
         for number in range(jobs):
             delay = task.jitter_ns if number == 0 else random.choice((0, random.randint(0, task.jitter_ns)))
             last_release = max(last_release, arrival + delay, 0)
-            program = random_program(random, task, full=full)
+            program = random_program(random, task, full=full, waits_ns=waits.get(task.name, ()))
             # A release is never more than the jitter after its arrival: arrivals before 0 are released by 0.
             found[task.name].append(
                 Release(max(arrival, last_release - task.jitter_ns), last_release, program)
@@ -201,8 +221,10 @@ def random_releases(
     return found
 
 
-def random_program(random: Random, task: Task, *, full: bool) -> list[Step]:
-    """The task's sections at random places among its execution and its waits."""
+def random_program(
+    random: Random, task: SporadicTask, *, full: bool, waits_ns: Sequence[int] = ()
+) -> list[Step]:
+    """The task's sections at random places among its execution and its waits, which are part of its cost."""
     inner: dict[str, list[CriticalSection]] = defaultdict(list)
     for section in task.sections:
         inner[section.inside].append(section)
@@ -225,13 +247,13 @@ def random_program(random: Random, task: Task, *, full: bool) -> list[Step]:
         return [(LOCK, section.resource), *inside, (UNLOCK, section.resource)]
 
     groups: list[list[Step]] = []
-    for group in execution(task.cost_ns, inner[""]):
+    for group in execution(task.cost_ns - sum(waits_ns), inner[""]):
         if len(group) == 1 and int(group[0][1]) > 1:  # a wait can be within plain execution, too
             cut = random.randint(0, int(group[0][1]))
             groups += [[(RUN, cut)] if cut else [], [(RUN, int(group[0][1]) - cut)]]
         else:
             groups.append(group)
     groups = [group for group in groups if group and group != [(RUN, 0)]]
-    for wait_ns in task.waits_ns:  # never the last step: a job ends by executing
+    for wait_ns in waits_ns:  # never the last step: a job ends by executing
         groups.insert(random.randrange(len(groups)), [(WAIT, wait_ns)])
     return [step for group in groups for step in group]

@@ -11,10 +11,12 @@ from dataclasses import replace
 from random import Random
 from typing import TypeAlias
 
-from mauve_rt.analysis import CriticalSection, Task
+from sporadic_tasks import SporadicTask
+
+from mauve_rt.analysis.critical_section import CriticalSection
 
 MS = 1_000_000
-Change: TypeAlias = Callable[[Random, list[Task]], list[Task]]
+Change: TypeAlias = Callable[[Random, list[SporadicTask]], list[SporadicTask]]
 # Period (ms): share (%), least and largest factor from average to worst execution.
 WATERS_2015 = {
     1: (3, 1.30, 29.11),
@@ -42,7 +44,7 @@ def utilizations(random: Random, *, count: int, total: float) -> list[float]:
             return shares
 
 
-def waters_set(random: Random, *, count: int, total: float, grain_ns: int = 1) -> list[Task]:
+def waters_set(random: Random, *, count: int, total: float, grain_ns: int = 1) -> list[SporadicTask]:
     """Tasks of one CPU with distinct priorities in random order.
 
     UUniFast gives the shares of the average executions; each is multiplied by a factor for the worst
@@ -57,9 +59,8 @@ def waters_set(random: Random, *, count: int, total: float, grain_ns: int = 1) -
     scale = total / sum(worst)
     priorities = random.sample(range(1, 100), count)
     return [
-        Task(
+        SporadicTask(
             name=f"t{index}",
-            cpu=0,
             priority=priorities[index],
             separation_ns=period * MS,
             cost_ns=max(1, int(worst[index] * scale * period * MS / grain_ns)) * grain_ns,
@@ -69,14 +70,14 @@ def waters_set(random: Random, *, count: int, total: float, grain_ns: int = 1) -
     ]
 
 
-def with_jitter(random: Random, tasks: list[Task]) -> list[Task]:
+def with_jitter(random: Random, tasks: list[SporadicTask]) -> list[SporadicTask]:
     """Release jitter below the period, often none."""
     return [
         replace(task, jitter_ns=random.choice((0, random.randrange(task.separation_ns)))) for task in tasks
     ]
 
 
-def with_one_resource(random: Random, tasks: list[Task]) -> list[Task]:
+def with_one_resource(random: Random, tasks: list[SporadicTask]) -> list[SporadicTask]:
     """Some tasks lock one common resource."""
     return [
         replace(task, sections=(CriticalSection(resource="r", length_ns=random.randint(1, task.cost_ns)),))
@@ -86,16 +87,15 @@ def with_one_resource(random: Random, tasks: list[Task]) -> list[Task]:
     ]
 
 
-def small_set(random: Random, *, changed: Change | None = None) -> list[Task]:
+def small_set(random: Random, *, changed: Change | None = None) -> list[SporadicTask]:
     """Two to four tasks with periods of 4 to 24 ns and three priorities: quick to simulate."""
     tasks = []
     shares = utilizations(random, count=random.randint(2, 4), total=random.uniform(0.4, 0.95))
     for index, share in enumerate(shares):
         period = random.randint(4, 24)
         tasks.append(
-            Task(
+            SporadicTask(
                 name=f"t{index}",
-                cpu=0,
                 priority=random.randint(1, 3),
                 separation_ns=period,
                 cost_ns=max(1, int(share * period)),
@@ -106,7 +106,7 @@ def small_set(random: Random, *, changed: Change | None = None) -> list[Task]:
     return changed(random, tasks) if changed else tasks
 
 
-def with_resources(random: Random, tasks: list[Task]) -> list[Task]:
+def with_resources(random: Random, tasks: list[SporadicTask]) -> list[SporadicTask]:
     """Some tasks lock some of three resources, one after another or nested."""
     changed = []
     for task in tasks:
@@ -127,18 +127,3 @@ def with_resources(random: Random, tasks: list[Task]) -> list[Task]:
                 )
         changed.append(replace(task, sections=tuple(sections)))
     return changed
-
-
-def with_waits(random: Random, tasks: list[Task]) -> list[Task]:
-    """Some tasks wait for services, once or twice."""
-    return [
-        replace(task, waits_ns=tuple(random.randint(1, 5) for _ in range(random.randint(0, 2))))
-        if random.random() < 0.6
-        else task
-        for task in tasks
-    ]
-
-
-def with_both(random: Random, tasks: list[Task]) -> list[Task]:
-    """Resources and waits."""
-    return with_waits(random, with_resources(random, tasks))

@@ -11,7 +11,6 @@ from schedule_simulation import RUN, Release, simulate
 from std_msgs.msg import Float64
 
 from mauve_rt._kernel import PluginRegistry, Simulation
-from mauve_rt.analysis import Task
 from mauve_rt.analysis.demand import Demand, utilization_of
 from mauve_rt.analysis.digraph import DigraphTask, Job, digraph_of
 from mauve_rt.analysis.digraph_times import Component, digraph_times
@@ -164,23 +163,24 @@ def test_no_run_of_a_server_exceeds_its_demand_or_delays_others_beyond_their_bou
 
 
 LOW_MS, LOW_PERIOD_MS = 4, 25
+LOW = DigraphTask("low", (Job("W", (), LOW_MS * MS, "W", LOW_PERIOD_MS * MS, 10**9),))
+
+
+def with_low(server: Server) -> list[Component]:
+    """The server, and a component of lower priority."""
+    return [Component(server.task, 50), Component(LOW, 40)]
 
 
 def longest_below(server: Server, offset_ns: int) -> int:
-    """The longest response of a component of lower priority, in the run of the server."""
-    tasks = [
-        Task(name=name, cpu=0, priority=priority, separation_ns=1, cost_ns=1, deadline_ns=1)
-        for name, priority in (("server", 50), ("low", 40))
-    ]
+    """The longest response of the component of lower priority, in the run of the server."""
     end_ns = max(at_ns for at_ns, _ in server.served)
     low = range(offset_ns % (LOW_PERIOD_MS * MS), end_ns + 1, LOW_PERIOD_MS * MS)
     runs = {"server": server.releases(), "low": [Release(at, at, [(RUN, LOW_MS * MS)]) for at in low]}
-    return simulate(tasks, runs)["low"]
+    return simulate(with_low(server), runs)["low"]
 
 
 def bound_below(server: Server) -> int:
-    low = DigraphTask("low", (Job("W", (), LOW_MS * MS, "W", LOW_PERIOD_MS * MS, 10**9),))
-    bound_ns = digraph_times([Component(server.task, 50), Component(low, 40)])["low"].response_ns
+    bound_ns = digraph_times(with_low(server))["low"].response_ns
     assert bound_ns is not None
     return bound_ns
 

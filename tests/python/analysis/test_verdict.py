@@ -12,9 +12,9 @@ from analysis_machines import MS, connected, event, execution, machine, wait
 from random_digraphs import random_digraph
 from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step, simulate
 
-from mauve_rt.analysis import Task
 from mauve_rt.analysis.bounds import Subject, bounds_of
 from mauve_rt.analysis.digraph import START, DigraphTask, Job, digraph_of, period_of
+from mauve_rt.analysis.digraph_times import Component
 from mauve_rt.analysis.machines import Machine
 from mauve_rt.analysis.schedule import Cycle, Member, Schedule, run
 from mauve_rt.analysis.verdict import Outcome, Verdict, judge
@@ -187,10 +187,7 @@ def test_runs_are_those_of_the_other_simulation(*, locks: bool) -> None:
         begins = [(urgency[cycle.component], cycle.ready_ns) for cycle in schedule.cycles]
         if len(set(begins)) < len(begins):
             continue  # who goes first is left open
-        tasks = [
-            Task(name=name, cpu=0, priority=priority, separation_ns=1, cost_ns=1, deadline_ns=1)
-            for name, priority in urgency.items()
-        ]
+        components = [Component(one.task, one.machine.priority) for one in members]
         sections = {one.task.name: one.sections for one in members}
         releases: dict[str, list[Release]] = {name: [] for name in urgency}
         done: dict[str, list[Cycle]] = {name: [] for name in urgency}
@@ -198,7 +195,7 @@ def test_runs_are_those_of_the_other_simulation(*, locks: bool) -> None:
             steps = program(cycle, sections[cycle.component], before[number] if locks else 0)
             done[cycle.component].append(cycle)
             releases[cycle.component].append(Release(cycle.nominal_ns, cycle.ready_ns, steps))
-        expected = simulate(tasks, releases)
+        expected = simulate(components, releases)
         for name, cycles in done.items():
             if cycles and all(one.finish_ns >= 0 for one in cycles):
                 assert max(one.finish_ns - one.nominal_ns for one in cycles) == expected[name], (seed, name)
@@ -248,16 +245,13 @@ def test_a_more_urgent_thread_takes_a_lock_before_the_one_that_was_woken_for_it(
     ]
     done = {cycle.component: cycle.finish_ns for cycle in run(members, AtOnce(), most_jobs=9).cycles}
     assert (done["high"], done["mid"]) == (13, 17)
-    tasks = [
-        Task(name=name, cpu=0, priority=priority, separation_ns=1, cost_ns=1, deadline_ns=1)
-        for name, priority in (("low", 1), ("mid", 2), ("high", 3))
-    ]
+    components = [Component(one.task, one.machine.priority) for one in members]
     programs = {"low": (0, 10), "mid": (5, 4), "high": (10, 3)}
     releases = {
         name: [Release(at, at, [(LOCK, "A"), (RUN, held), (UNLOCK, "A")])]
         for name, (at, held) in programs.items()
     }
-    assert simulate(tasks, releases) == {"low": 10, "mid": 12, "high": 3}
+    assert simulate(components, releases) == {"low": 10, "mid": 12, "high": 3}
 
 
 def test_one_has_the_processor_and_it_is_one_of_the_most_urgent() -> None:
