@@ -1,7 +1,7 @@
 """Response times by the package response-time-analysis (pyRTA), for comparison.
 
-pyRTA measures from the release, `digraph_times` from the arrival: the first release of a busy window comes a whole
-jitter after its arrival, the later ones come without delay. With jitter below the period, one job is
+pyRTA measures from the release, `digraph_times` from the arrival: the first release of a busy window comes a
+whole jitter after its arrival, the later ones come without delay. With jitter below the period, one job is
 released at offset 0.
 """
 

@@ -11,7 +11,11 @@ def task(name: str, *, period: int, cost: int, priority: int, **others: object) 
     """A task whose deadline is its period if none is given."""
     facts: dict[str, object] = {"deadline_ns": period, **others}
     return SporadicTask(
-        name=name, separation_ns=period, cost_ns=cost, priority=priority, **facts  # type: ignore[arg-type]
+        name=name,
+        separation_ns=period,
+        cost_ns=cost,
+        priority=priority,
+        **facts,  # type: ignore[arg-type]
     )
 
 

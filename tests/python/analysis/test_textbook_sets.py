@@ -33,11 +33,13 @@ def test_why_there_is_no_bound():
     full = [task("a", period=10, cost=6, priority=2), task("b", period=10, cost=4, priority=1)]
     assert [bound.response_ns for bound in response_times(full)] == [6, 10]
     late = [full[0], task("b", period=10, cost=4, priority=1, jitter_ns=1)]
-    on_top = "the utilization at this priority is 1, and blocking or late wake-ups come on top: nothing is left"
-    assert response_times(late)[1].reason == on_top
+    reason = (
+        "the utilization at this priority is 1, and blocking or late wake-ups come on top: nothing is left"
+    )
+    assert response_times(late)[1].reason == reason
     above_late = [replace(full[0], jitter_ns=1), full[1]]
     assert [bound.response_ns for bound in response_times(above_late)] == [7, None]
-    assert response_times(above_late)[1].reason == on_top
+    assert response_times(above_late)[1].reason == reason
     below_late = [*full, task("c", period=10, cost=1, priority=1, jitter_ns=1)]
     assert response_times(below_late)[0].response_ns == 6
     more = [full[0], task("b", period=10, cost=5, priority=1)]
