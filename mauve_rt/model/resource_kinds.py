@@ -1,10 +1,11 @@
 """Kinds of resources: which keys one has in a file and what they may be, as the registry tells it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
 from mauve_rt._kernel import ResourceKind, ResourceParameter, given_resource_kinds
+from mauve_rt.file_schema.json_schema import JsonSchema, given
 from mauve_rt.file_schema.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
 from mauve_rt.file_schema.section import Setting
 from mauve_rt.file_schema.yaml_file import Location
@@ -67,6 +68,36 @@ def parameter_setting(parameter: ResourceParameter) -> Setting:
     """What a parameter may be in a file."""
     kind, hint = _kind_of(parameter), _hint(parameter)
     return Setting(kind, parameter.description, default=parameter.initial, hint=hint)
+
+
+def resource_schema(kind: ResourceKind, *, others: Iterable[str]) -> JsonSchema:
+    """What a kind adds to the schema of a resource; `others`: the keys that any kind has."""
+    own = [each for each in kind.parameters if each.file_key == each.name]
+    keys: JsonSchema = {key: True for key in others}
+    keys |= {each.name: parameter_setting(each).json_schema({}, unit=each.unit) for each in own}
+    patterns = {}
+    if kind.type_kind == "type":
+        counts = _SEQUENCE.json_schema({})
+        by_field = {"type": "object", "additionalProperties": counts}
+        keys[_CAPACITY] = {"anyOf": [by_field, keys[_CAPACITY]]} if _CAPACITY in keys else by_field
+        patterns = {"patternProperties": {rf"^{_CAPACITY}\.": counts}}
+    if kind.type_kind:
+        keys["type"] = {"minLength": 1}
+    elif kind.messages:
+        keys["type"] = {"enum": ["", *kind.messages]}
+    offers = given("offers")
+    is_client = kind.type_kind == "call_type"
+    service: list[JsonSchema] = [{"not": offers} if is_client else offers]
+    if not has_key(kind, "service.timeout_ms"):
+        service.append({"properties": {"timeout_ms": False}})
+    keys["service"] = {"if": {"type": "object"}, "then": {"allOf": service}}
+    if is_client:
+        keys["topic"] = {"type": "null"}
+        keys["service"]["type"] = "object"
+    needed = [each.name for each in own if each.required]
+    needed += ["type"] if kind.type_kind else []
+    needed += ["service"] if is_client else []
+    return {"properties": keys, "required": needed, "additionalProperties": False, **patterns}
 
 
 def _read(parameter: ResourceParameter, value: Any, place: Location, faults: Faults) -> Any:
