@@ -5,7 +5,7 @@ from functools import cache
 from typing import Any
 
 from mauve_rt._kernel import ResourceKind, ResourceParameter, given_resource_kinds
-from mauve_rt.file_schema.json_schema import JsonSchema, given
+from mauve_rt.file_schema.json_schema import JsonSchema, given, when
 from mauve_rt.file_schema.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
 from mauve_rt.file_schema.section import Setting
 from mauve_rt.file_schema.yaml_file import Location
@@ -85,19 +85,22 @@ def resource_schema(kind: ResourceKind, *, others: Iterable[str]) -> JsonSchema:
         keys["type"] = {"minLength": 1}
     elif kind.messages:
         keys["type"] = {"enum": ["", *kind.messages]}
-    offers = given("offers")
-    is_client = kind.type_kind == "call_type"
-    service: list[JsonSchema] = [{"not": offers} if is_client else offers]
-    if not has_key(kind, "service.timeout_ms"):
-        service.append({"properties": {"timeout_ms": False}})
-    keys["service"] = {"if": {"type": "object"}, "then": {"allOf": service}}
-    if is_client:
+    keys["service"] = service_schema(kind)
+    if is_client := kind.type_kind == "call_type":
         keys["topic"] = {"type": "null"}
-        keys["service"]["type"] = "object"
     needed = [each.name for each in own if each.required]
     needed += ["type"] if kind.type_kind else []
     needed += ["service"] if is_client else []
     return {"properties": keys, "required": needed, "additionalProperties": False, **patterns}
+
+
+def service_schema(kind: ResourceKind | None) -> JsonSchema:
+    """What a kind, or that of a plug-in, adds to the schema of its service."""
+    is_client = kind is not None and kind.type_kind == "call_type"
+    has_timeout = kind is not None and has_key(kind, "service.timeout_ms")
+    rules = [{"not": given("offers")} if is_client else given("offers")]
+    rules += [] if has_timeout else [{"properties": {"timeout_ms": False}}]
+    return {"type": "object", "allOf": rules} if is_client else when({"type": "object"}, {"allOf": rules})
 
 
 def _read(parameter: ResourceParameter, value: Any, place: Location, faults: Faults) -> Any:

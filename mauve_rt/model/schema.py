@@ -48,7 +48,7 @@ from mauve_rt.file_schema.section import Part, Section, setting
 from mauve_rt.file_schema.words import listed
 from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
-from mauve_rt.model.resource_kinds import given_kinds, read_parameters, resource_schema
+from mauve_rt.model.resource_kinds import given_kinds, read_parameters, resource_schema, service_schema
 
 PropertyValue = bool | int | float | str
 
@@ -393,6 +393,8 @@ class ResourceModel(Section):
         for name, kind in given_kinds().items():
             definitions[f"{name} resource"] = resource_schema(kind, others=cls.settings)
         kinds = [when(has("kind", name), reference(f"{name} resource")) for name in given_kinds()]
+        of_plugin = {"properties": {"kind": {"pattern": "/"}}}
+        kinds.append(when(of_plugin, {"properties": {"service": service_schema(None)}}))
         return {**schema, "allOf": kinds}
 
 
