@@ -63,7 +63,7 @@ class Setting:
             schema = or_null(schema)
         elif not self.is_required and self.default != "":
             schema = {**schema, "default": _plain(self.default)}
-        return {**schema, "description": described(self.what, self.kind, unit)}
+        return {**schema, "description": described(self.what, self.kind, unit, schema.get("default"))}
 
 
 def setting(kind: Kind, what: str, *, default: Any = _REQUIRED, hint: str = "", key: str = "") -> Any:

@@ -4,6 +4,7 @@ import math
 from typing import Any
 
 from mauve_rt.file_schema.kinds import Kind, Real, Whole
+from mauve_rt.file_schema.words import shown
 
 _UNITS = {"ns": "ns", "us": "µs", "ms": "ms", "s": "s", "bytes": "bytes", "records": "records"}
 _HUGE = 1e12  # a bound that only keeps numbers within 64 bits
@@ -21,9 +22,11 @@ def range_of(kind: Kind) -> str:
     return limits(kind.least, kind.most) if isinstance(kind, Whole | Real) else ""
 
 
-def described(what: str, kind: Kind, unit: str) -> str:
-    """Sentences: what a value is for, its unit and its range."""
-    facts = (what, unit and f"unit: {unit}", (bounds := range_of(kind)) and f"range: {bounds}")
+def described(what: str, kind: Kind, unit: str, default: Any = None) -> str:
+    """Sentences: what a value is for, its unit, its range and its default."""
+    facts = [what, unit and f"unit: {unit}", (bounds := range_of(kind)) and f"range: {bounds}"]
+    if isinstance(default, bool | int | float | str) and default != "":
+        facts.append(f"default: {default if isinstance(default, str) else shown(default)}")
     return " ".join(sentence(fact) for fact in facts if fact)
 
 

@@ -77,7 +77,7 @@ def condition_schema(kind: str) -> JsonSchema:
 
 def _parameter_schema(parameter: ConditionParameter) -> JsonSchema:
     kind = parameter_kind(parameter)
-    words = described("", kind, parameter.unit)
+    words = described("", kind, parameter.unit, parameter.initial)
     description = {"description": words} if words else {}
     default = {} if parameter.initial is None else {"default": parameter.initial}
     return {**kind.json_schema({}), **default, **description}

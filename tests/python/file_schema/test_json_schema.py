@@ -15,7 +15,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
-from mauve_rt.cli.schema_verb import file_schema
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.file_schema import kinds
 from mauve_rt.file_schema.json_schema import text_form
@@ -28,6 +27,7 @@ from mauve_rt.model.schema import FileModel
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import STEPS, Change
 from mauve_rt.modelling.schema import ModelFile
+from mauve_rt.scaffold.schemas import file_schema
 from mauve_rt.supervision.rules import Rules
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -213,9 +213,10 @@ def test_every_kind_of_file_is_in_the_corpus() -> None:
 def test_every_key_is_described_with_its_unit_range_and_default() -> None:
     schema = file_schema(FileKind.ARCHITECTURE)
     settings = schema["$defs"]["ComponentModel"]["properties"]
-    assert settings["stack_bytes"]["description"].endswith("Unit: bytes. Range: 65,536 to 1,073,741,824.")
+    assert settings["stack_bytes"]["description"].endswith("Unit: bytes. Range: 65,536 to 1,073,741,824. Default: 524288.")
     assert (settings["stack_bytes"]["minimum"], settings["stack_bytes"]["maximum"]) == (65536, 2**30)
     assert settings["overrun"]["default"] == "skip"
+    assert settings["overrun"]["description"].endswith("Default: skip.")
     for kind in FileKind:
         schema = file_schema(kind)
         sections = [each for each in (schema, *schema["$defs"].values()) if each.get("type") == "object"]
