@@ -25,9 +25,7 @@ def reference(name: str) -> JsonSchema:
     return {"$ref": f"#/$defs/{name}"}
 
 
-def defined(
-    name: str, definitions: Definitions, make: Callable[[Definitions], JsonSchema]
-) -> JsonSchema:
+def defined(name: str, definitions: Definitions, make: Callable[[Definitions], JsonSchema]) -> JsonSchema:
     """A reference to a definition, which is made where there is none; it may have itself within."""
     if name not in definitions:
         definitions[name] = {}

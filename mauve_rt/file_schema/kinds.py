@@ -227,4 +227,9 @@ class TableOf(Kind):
         """As Kind."""
         least = {"minProperties": self.few} if self.few else {}
         names = {"propertyNames": form} if (form := self.names.json_form()) else {}
-        return {"type": "object", "additionalProperties": self.kind.json_schema(definitions), **names, **least}
+        return {
+            "type": "object",
+            "additionalProperties": self.kind.json_schema(definitions),
+            **names,
+            **least,
+        }

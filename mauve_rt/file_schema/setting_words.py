@@ -18,7 +18,9 @@ def unit_of(key: str) -> str:
 def range_of(kind: Kind) -> str:
     """The range of a number; empty where it has none."""
     if isinstance(kind, Real) and kind.above > -math.inf:
-        return f"more than {kind.above:g}" + (f", at most {_number(kind.most)}" if _is_bound(kind.most) else "")
+        return f"more than {kind.above:g}" + (
+            f", at most {_number(kind.most)}" if _is_bound(kind.most) else ""
+        )
     return limits(kind.least, kind.most) if isinstance(kind, Whole | Real) else ""
 
 

@@ -73,7 +73,7 @@ def parameter_setting(parameter: ResourceParameter) -> Setting:
 def resource_schema(kind: ResourceKind, *, others: Iterable[str]) -> JsonSchema:
     """What a kind adds to the schema of a resource; `others`: the keys that any kind has."""
     own = [each for each in kind.parameters if each.file_key == each.name]
-    keys: JsonSchema = {key: True for key in others}
+    keys: JsonSchema = dict.fromkeys(others, True)
     keys |= {each.name: parameter_setting(each).json_schema({}, unit=each.unit) for each in own}
     patterns = {}
     if kind.type_kind == "type":

@@ -164,7 +164,9 @@ class PropertyModel(Section):
             "float64": {"type": "number"},
             "string": {"type": "string"},
         }
-        rules = [when(has("type", name), {"properties": {"default": kind}}) for name, kind in defaults.items()]
+        rules = [
+            when(has("type", name), {"properties": {"default": kind}}) for name, kind in defaults.items()
+        ]
         ranged = {"anyOf": [given("minimum"), given("maximum")]}
         return {"allOf": [*rules, when(ranged, has("type", "int64", "float64"))]}
 
@@ -244,7 +246,7 @@ class PortModel(Section):
         """As misfit()."""
         written = [when(given(key), given("write")) for key in ("on_commit", "on_stop")]
         call = when(given("call"), {"properties": {"optional": {"const": False}}})
-        kinds = [*map(given, ("read", "write", "call")), has("event", True)]  # noqa: FBT003 - a value
+        kinds = [*map(given, ("read", "write", "call")), has("event", True)]
         return {"oneOf": kinds, "allOf": [*written, call]}
 
     @property

@@ -1,6 +1,7 @@
 """JSON Schemas of files: they accept what `mauve check` accepts, and refuse the forms that it refuses."""
 
 import importlib.util
+import json
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft202012Validator
 
+from mauve_rt.cli.main import main
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.file_schema import kinds
 from mauve_rt.file_schema.json_schema import text_form
@@ -35,19 +37,25 @@ TESTS = ROOT / "tests" / "python"
 ONLY_A_FEW = 10
 
 BEYOND: dict[str, Callable[[Fault], bool]] = {
-    "two values of the file are compared": lambda fault: re.search(
-        r"no less than warn|at most max_execution_ns|no less than deadline_ms|its (mini|maxi)mum|than the maximum",
-        str(fault.limit),
-    )
-    is not None,
-    "the count of at_least is compared with the length of its list": lambda fault: fault.place[-1:]
-    == ("count",),
-    "a number of JSON Schema has no type: 1.0 is 1": lambda fault: isinstance(fault.found, float)
-    and fault.found.is_integer(),
+    "two values of the file are compared": lambda fault: (
+        re.search(
+            r"no less than warn|at most max_execution_ns|no less than deadline_ms|its (mini|maxi)mum|than the maximum",
+            str(fault.limit),
+        )
+        is not None
+    ),
+    "the count of at_least is compared with the length of its list": lambda fault: (
+        fault.place[-1:] == ("count",)
+    ),
+    "a number of JSON Schema has no type: 1.0 is 1": lambda fault: (
+        isinstance(fault.found, float) and fault.found.is_integer()
+    ),
     "NaN is no number that JSON Schema compares": lambda fault: fault.found != fault.found,
-    "a time is a whole number of ns, of 64 bits": lambda fault: str(fault.limit).startswith("a time such as")
-    and re.fullmatch(r"[\d.]+ *(ns|us|ms|s)", str(fault.found)) is not None
-    and re.search("[1-9]", str(fault.found)) is not None,
+    "a time is a whole number of ns, of 64 bits": lambda fault: (
+        str(fault.limit).startswith("a time such as")
+        and re.fullmatch(r"[\d.]+ *(ns|us|ms|s)", str(fault.found)) is not None
+        and re.search("[1-9]", str(fault.found)) is not None
+    ),
 }
 """Faults that a schema cannot see, by reason."""
 BEYOND_PROBLEMS = "is the name of a component and of a resource|asks for a CPU that this machine"
@@ -123,7 +131,10 @@ def corpus() -> Iterator[tuple[FileKind, str, str]]:
     for text in rows(rules.test_what_is_no_rules_file_is_refused):
         yield FileKind.RULES, f"none: {text}", text
     leaves = module_of("supervision/test_condition_kinds.py")
-    for text in [*(each for texts in leaves.GOOD.values() for each in texts), *(bad for bad, _ in leaves.BAD)]:
+    for text in [
+        *(each for texts in leaves.GOOD.values() for each in texts),
+        *(bad for bad, _ in leaves.BAD),
+    ]:
         leaf = text.replace(leaves.MARK, "")
         yield FileKind.RULES, leaf, f"mauve: 1\nrules:\n- name: one\n  when: {{{leaf}}}\n  do: [{STOP}]\n"
     model = module_of("modelling/test_checks.py")
@@ -169,7 +180,23 @@ def test_a_schema_is_one(kind: FileKind) -> None:
     assert schema["$id"] == f"urn:mauve_rt:schema:{kind.value}:1"
 
 
-@pytest.mark.parametrize(("kind", "name", "text"), [pytest.param(*each, id=f"{each[0].value}: {each[1]}") for each in corpus()])
+@pytest.mark.parametrize("kind", FileKind)
+def test_mauve_schema_prints_a_schema_of_each_kind(
+    kind: FileKind, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["schema", kind.value]) == 0
+    assert json.loads(capsys.readouterr().out) == file_schema(kind)
+
+
+def test_mauve_schema_of_another_kind_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["schema", "robot"])
+    assert "choose from 'architecture', 'rules', 'steps', 'model'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "text"), [pytest.param(*each, id=f"{each[0].value}: {each[1]}") for each in corpus()]
+)
 def test_a_file_of_the_tests_has_the_same_verdict(kind: FileKind, name: str, text: str) -> None:
     try:
         file = YamlFile(name, text=text)
@@ -186,7 +213,7 @@ def test_steps_have_the_same_verdict(text: str) -> None:
 def test_each_kind_of_step_has_the_same_verdict_with_and_without_each_key() -> None:
     for name in STEP_KINDS:
         for keys in ("", "target", "name", "value", "target name", "target value", "target name value"):
-            step = {"kind": name} | {key: "text" for key in keys.split()}
+            step = {"kind": name} | dict.fromkeys(keys.split(), "text")
             assert validator(FileKind.STEPS).is_valid([step]) == (not faults_of(FileKind.STEPS, [step])), step
 
 
@@ -213,7 +240,9 @@ def test_every_kind_of_file_is_in_the_corpus() -> None:
 def test_every_key_is_described_with_its_unit_range_and_default() -> None:
     schema = file_schema(FileKind.ARCHITECTURE)
     settings = schema["$defs"]["ComponentModel"]["properties"]
-    assert settings["stack_bytes"]["description"].endswith("Unit: bytes. Range: 65,536 to 1,073,741,824. Default: 524288.")
+    assert settings["stack_bytes"]["description"].endswith(
+        "Unit: bytes. Range: 65,536 to 1,073,741,824. Default: 524288."
+    )
     assert (settings["stack_bytes"]["minimum"], settings["stack_bytes"]["maximum"]) == (65536, 2**30)
     assert settings["overrun"]["default"] == "skip"
     assert settings["overrun"]["description"].endswith("Default: skip.")
@@ -235,7 +264,27 @@ def test_a_pattern_is_of_ascii_and_whole(pattern: str) -> None:
 
 
 JUNK = st.sampled_from(
-    [None, True, 0, 1, -1, 1.5, 10**30, float("inf"), "", "a b", "a__b", "a\n", "a/B", "x.y", "installed", [], ["a"], {}, {"a": 1}]
+    [
+        None,
+        True,
+        0,
+        1,
+        -1,
+        1.5,
+        10**30,
+        float("inf"),
+        "",
+        "a b",
+        "a__b",
+        "a\n",
+        "a/B",
+        "x.y",
+        "installed",
+        [],
+        ["a"],
+        {},
+        {"a": 1},
+    ]
 )
 
 
@@ -278,7 +327,9 @@ def sections_of(section: type[Section]) -> st.SearchStrategy[Any]:
 
 def places(value: Any) -> Iterator[tuple[Any, Any]]:
     """(container, key) of each value in another."""
-    entries = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    entries = (
+        value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    )
     for key, each in list(entries):
         yield value, key
         yield from places(each)
