@@ -1,4 +1,4 @@
-"""`mauve schema KIND`: the JSON Schema of a kind of file, for editors. The tables that check files make it."""
+"""`mauve schema KIND`: the JSON Schema of a kind of file, made from the tables that check files."""
 
 import argparse
 

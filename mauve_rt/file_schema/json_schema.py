@@ -78,12 +78,12 @@ def first_sentence(text: str | None) -> str:
 
 
 def _ecma(pattern: str) -> str:
-    return "".join(_tokens(re.sub(r"\(\?P<\w+>", "(?:", pattern)))
+    return "".join(_parts(re.sub(r"\(\?P<\w+>", "(?:", pattern)))
 
 
-def _tokens(pattern: str) -> Iterable[str]:
+def _parts(pattern: str) -> Iterable[str]:
     in_class = False
-    for token in re.findall(r"\\.|[^\\]", pattern, re.DOTALL):
-        letters = _CLASSES.get(token)
-        yield token if letters is None else letters if in_class else f"[{letters}]"
-        in_class = token == "[" or (in_class and token != "]")
+    for part in re.findall(r"\\.|[^\\]", pattern, re.DOTALL):
+        letters = _CLASSES.get(part)
+        yield part if letters is None else letters if in_class else f"[{letters}]"
+        in_class = part == "[" or (in_class and part != "]")

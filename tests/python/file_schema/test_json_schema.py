@@ -39,7 +39,7 @@ ONLY_A_FEW = 10
 BEYOND: dict[str, Callable[[Fault], bool]] = {
     "two values of the file are compared": lambda fault: (
         re.search(
-            r"no less than warn|at most max_execution_ns|no less than deadline_ms|its (mini|maxi)mum|than the maximum",
+            r"than warn|at most max_execution_ns|than deadline_ms|its (mini|maxi)mum|than the maximum",
             str(fault.limit),
         )
         is not None
@@ -258,7 +258,7 @@ def test_every_key_is_described_with_its_unit_range_and_default() -> None:
 def test_a_pattern_is_of_ascii_and_whole(pattern: str) -> None:
     form = text_form(pattern, without="__")["pattern"]
     assert "?P" not in form
-    for text in ("a", "1x", "1 x", "a\n", "é", "a__b", "x y", "١x"):
+    for text in ("a", "1x", "1 x", "a\n", "é", "a__b", "x y", "\u0661x"):
         whole = re.fullmatch(pattern, text, re.ASCII) is not None and "__" not in text
         assert (re.search(form, text) is not None) == whole, text
 
@@ -288,7 +288,7 @@ JUNK = st.sampled_from(
 )
 
 
-def values_of(kind: kinds.Kind) -> st.SearchStrategy[Any]:
+def values_of(kind: kinds.Kind) -> st.SearchStrategy[Any]:  # noqa: PLR0911 - one for each kind
     """Values of which most are good."""
     match kind:
         case kinds.Flag():
