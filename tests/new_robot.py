@@ -45,6 +45,19 @@ class NewRobot:
         assert "warning: " not in said, said
         return said
 
+    def warnings(self) -> str:
+        """What `mauve check` has to say of its files, once it is built."""
+        prefixes = f"{self.folder / 'install'}:{self._environment.get('AMENT_PREFIX_PATH', '')}"
+        files = sorted(self.folder.glob("architecture/*.yaml"))
+        done = subprocess.run(
+            [self._mauve, "check", *map(str, files)],
+            env=self._environment | {"AMENT_PREFIX_PATH": prefixes},
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        return done.stderr
+
     @contextmanager
     def running(self, *words: str) -> Iterator[None]:
         """While `mauve run` does. Ctrl-C ends it."""

@@ -14,10 +14,11 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
+    from mauve_rt.model.file_kinds import FileKind
     from mauve_rt.model.remarks import Subject, Uses
     from mauve_rt.modelling.package_model import PackageModel
 
@@ -48,29 +49,35 @@ def main(args: argparse.Namespace) -> int:
     if len(architectures) > 1 and len(kinds) > len(architectures):
         print("mauve: check steps and rules with one architecture file, not with several", file=sys.stderr)
         return BAD_USAGE
+    order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
+    return _check_all(
+        {path: kinds[path] for path in sorted(kinds, key=lambda path: order.index(kinds[path]))}
+    )
+
+
+def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
+    """Check files in this order. The warnings of an architecture come when all files are read."""
+    from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
     from mauve_rt.model.remarks import Uses, remarks  # noqa: PLC0415
 
-    status, model = OK, None
+    status, model, uses = OK, None, Uses()
     models: list[PackageModel] = []
-    uses = Uses()
     subjects: list[Subject] = []
-    order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
-    for path in sorted(kinds, key=lambda path: order.index(kinds[path])):
+    for path, kind in kinds.items():
         try:
-            if kinds[path] is FileKind.MODEL:
+            if kind is FileKind.MODEL:
                 models.append(_check_model(path))
-            elif kinds[path] is FileKind.ARCHITECTURE:
+            elif kind is FileKind.ARCHITECTURE:
                 subjects.append(_check_architecture(path, models, uses))
                 model = subjects[-1].model
-            elif kinds[path] is FileKind.RULES:
+            elif kind is FileKind.RULES:
                 _check_rules(path, model, uses)
             else:
                 _check_steps(path, model, uses)
         except ArchitectureFileError as error:
             status = _tell(error)
-    if status == OK:
-        for subject in subjects:
-            _warn(subject.model.path, remarks(subject))
+    for subject in subjects if status == OK else ():
+        _warn(subject.model.path, remarks(subject))
     return status
 
 

@@ -3,7 +3,7 @@
 Each claim is true of the files that are checked together. What is common and meant has no remark.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -44,8 +44,8 @@ class Uses:
 
     def changed(self) -> set[str]:
         """Components that steps start, stop, connect or remove."""
-        kinds = STEP_KINDS
-        return {each.target for each in self.steps if kinds[each.kind].leaves or kinds[each.kind].is_structural}
+        kinds = {name for name, kind in STEP_KINDS.items() if kind.leaves or kind.is_structural}
+        return {step.target for step in self.steps if step.kind in kinds}
 
     def connected(self) -> set[str]:
         """Resources to which steps connect a port."""
@@ -70,9 +70,7 @@ class Subject:
     def tasks(self) -> dict[str, DigraphTask]:
         """The jobs of the components that are released by time alone."""
         periodic = [each for each in self.components if each.period_ns]
-        return {
-            each.name: digraph_of(Machine.of(each, states=self._states[each.name])) for each in periodic
-        }
+        return {each.name: digraph_of(Machine.of(each, states=self._states[each.name])) for each in periodic}
 
     @cached_property
     def readers(self) -> Mapping[str, list[str]]:
@@ -152,7 +150,8 @@ def _two_writers(subject: Subject) -> Iterator[Problem]:
             continue
         if _ELSEWHERE in several or subject.uses.changed() & {*several}:
             continue
-        what = f"resource '{name}' has {len(several)} writers, {listed(several, last='and')}: the last one counts"
+        names = listed(several, last="and")
+        what = f"resource '{name}' has {len(several)} writers, {names}: the last one counts"
         remedy = "connect one of them, or let a ring_buffer keep the values of each"
         yield subject.model.key_problem(("resources", name), what, remedy=remedy)
 
@@ -186,14 +185,15 @@ def _full_cpus(subject: Subject) -> Iterator[Problem]:
         shares = {task.name: float(utilization_of(task)) for task in known}
         if sum(shares.values()) > 1:
             parts = listed((f"{name} {share:.0%}" for name, share in shares.items()), last="and")
-            what = f"the components on CPU {cpu} declare {sum(shares.values()):.0%} of its time: {parts}"
+            whole = f"{sum(shares.values()):.0%}"
+            what = f"the components on CPU {cpu} declare up to {whole} of its time: {parts}"
             lowest = min((each for each in components if each.name in shares), key=lambda each: each.priority)
             place = ("components", lowest.name, "cpus")
             yield subject.model.key_problem(place, what, remedy="move one to another CPU, or shorten states")
 
 
 def _inverse_priorities(subject: Subject) -> Iterator[Problem]:
-    """A longer period with a higher priority, on one CPU; a declared deadline counts in place of the period."""
+    """A longer period with a higher priority, on one CPU; a declared deadline takes the period's place."""
     for cpu, components in subject.on_one_cpu():
         times = {each.name: each.deadline_ns or each.period_ns for each in components}
         for fast in components:
@@ -214,7 +214,8 @@ def _unused_alternatives(subject: Subject) -> Iterator[Problem]:
     if not subject.uses.has_rules:
         return
     for name, component in subject.model.components.items():
-        used: Collection[str] = {component.fallback, *subject.uses.plugins(name)}
+        used = {component.shell, component.core, component.fsm, component.fallback}
+        used |= subject.uses.plugins(name)
         parts = component.alternatives if isinstance(component.alternatives, list) else []
         for index, part in enumerate(parts):
             if part not in used:

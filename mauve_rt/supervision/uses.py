@@ -30,6 +30,9 @@ def unpublished_topics(file: RulesFile, model: ArchitectureModel) -> Iterator[Pr
             if topic is None or topic.direction != "publish" or "topic" not in leaf.parameters:
                 continue
             if leaf.parameters["topic"] and resource.service is None and not writers_of(name, model):
-                what = f"rule '{rule.name}': resource '{name}' publishes topic {topic.name}, and no component writes it"
+                what = (
+                    f"rule '{rule.name}': resource '{name}' publishes topic {topic.name}, "
+                    "and no component writes it"
+                )
                 remedy = f"connect a writer to {name}.write in {model.path}"
                 yield file.problem((*leaf.place, leaf.kind, "topic"), what, remedy=remedy)
