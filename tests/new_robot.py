@@ -47,15 +47,16 @@ class NewRobot:
 
     def warnings(self) -> str:
         """What `mauve check` has to say of its files, once it is built."""
-        prefixes = f"{self.folder / 'install'}:{self._environment.get('AMENT_PREFIX_PATH', '')}"
-        files = sorted(self.folder.glob("architecture/*.yaml"))
+        setup = f"install/share/{self._name}/local_setup.bash"
         done = subprocess.run(
-            [self._mauve, "check", *map(str, files)],
-            env=self._environment | {"AMENT_PREFIX_PATH": prefixes},
+            ["bash", "-c", f"source {setup} && '{self._mauve}' check architecture/*.yaml"],
+            env=self._environment,
+            cwd=self.folder,
             capture_output=True,
             text=True,
-            check=True,
+            check=False,
         )
+        assert done.returncode == 0, done.stderr
         return done.stderr
 
     @contextmanager

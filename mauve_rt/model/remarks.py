@@ -134,7 +134,7 @@ def _unused_resources(subject: Subject) -> Iterator[Problem]:
         if not readers and not writers:
             what = f"resource '{name}' is not used: no port is connected to it"
             yield subject.model.key_problem(place, what, remedy="connect a writer and a reader, or remove it")
-        elif not readers:
+        elif not readers and len(subject.components) > 1:  # else `mauve echo` reads it
             what = f"resource '{name}' is written, and no component, topic, mirror or recording reads it"
             yield subject.model.key_problem(place, what, remedy="connect a reader, or remove it")
         elif not writers:

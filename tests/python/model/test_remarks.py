@@ -82,7 +82,7 @@ CASES: dict[str, tuple[list[tuple[str, str]], str, str]] = {
     "full CPU": (
         [(MOVE, "Move: {wcet_ns: 8000000}"), (CONTROL, "Control: {wcet_ns: 9000000}")],
         "cpus: [0]",
-        "the components on CPU 0 declare up to 140% of its time: robot 90%, control 45%, guidance 1%, mapping",
+        "the components on CPU 0 declare up to 140% of its time: robot 90%, control 45%, guidance 1%",
     ),
     "priorities": (
         [("    priority: 50\n", "    priority: 75\n")],
@@ -175,3 +175,9 @@ def test_a_rule_on_a_topic_that_nothing_here_publishes(check: Check) -> None:
 def test_the_mission_has_no_warning(names: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", *(str(MISSION / name) for name in names)]) == 0
     assert capsys.readouterr().err == ""
+
+
+def test_the_one_component_of_a_first_program_needs_no_reader(check: Check) -> None:
+    text = (MISSION / "metronome.yaml").read_text(encoding="utf-8")
+    alone = changed((", topic: {name: beat, direction: publish}", ""), text=text)
+    assert check(metronome=alone) == []
