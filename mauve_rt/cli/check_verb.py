@@ -159,7 +159,7 @@ def _check_rules(path: Path, model: "ArchitectureModel | None", uses: "Uses") ->
     if found:
         raise ArchitectureFileError(path, found)
     if model is not None:
-        _warn(path, unpublished_topics(file, model))
+        _warn(path, unpublished_topics(file, model, uses))
     print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")
 
 
