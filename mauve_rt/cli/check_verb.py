@@ -14,10 +14,12 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Mapping
 
     from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
+    from mauve_rt.model.file_kinds import FileKind
+    from mauve_rt.model.remarks import Subject, Uses
     from mauve_rt.modelling.package_model import PackageModel
 
 
@@ -47,19 +49,35 @@ def main(args: argparse.Namespace) -> int:
     if len(architectures) > 1 and len(kinds) > len(architectures):
         print("mauve: check steps and rules with one architecture file, not with several", file=sys.stderr)
         return BAD_USAGE
-    status, model = OK, None
-    models: list[PackageModel] = []
     order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
-    for path in sorted(kinds, key=lambda path: order.index(kinds[path])):
+    return _check_all(
+        {path: kinds[path] for path in sorted(kinds, key=lambda path: order.index(kinds[path]))}
+    )
+
+
+def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
+    """Check files in this order. The warnings of an architecture come when all files are read."""
+    from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
+    from mauve_rt.model.remarks import Uses, remarks  # noqa: PLC0415
+
+    status, model, uses = OK, None, Uses()
+    models: list[PackageModel] = []
+    subjects: list[Subject] = []
+    for path, kind in kinds.items():
         try:
-            if kinds[path] is FileKind.MODEL:
+            if kind is FileKind.MODEL:
                 models.append(_check_model(path))
-            elif kinds[path] is FileKind.ARCHITECTURE:
-                model = _check_architecture(path, models)
+            elif kind is FileKind.ARCHITECTURE:
+                subjects.append(_check_architecture(path, models, uses))
+                model = subjects[-1].model
+            elif kind is FileKind.RULES:
+                _check_rules(path, model, uses)
             else:
-                (_check_rules if kinds[path] is FileKind.RULES else _check_steps)(path, model)
+                _check_steps(path, model, uses)
         except ArchitectureFileError as error:
             status = _tell(error)
+    for subject in subjects if status == OK else ():
+        _warn(subject.model.path, remarks(subject))
     return status
 
 
@@ -85,12 +103,12 @@ def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
 
 
-def _check_architecture(path: Path, models: "Iterable[PackageModel]") -> "ArchitectureModel":
+def _check_architecture(path: Path, models: "Iterable[PackageModel]", uses: "Uses") -> "Subject":
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
     from mauve_rt.model import PluginIndex, build, configure, load_architecture  # noqa: PLC0415
     from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
-    from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
+    from mauve_rt.model.remarks import Subject  # noqa: PLC0415
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
@@ -99,10 +117,10 @@ def _check_architecture(path: Path, models: "Iterable[PackageModel]") -> "Archit
         index = add_modelled_parts(each, registry, index)
     architecture = build(model, registry, index=index)
     configure(model, architecture)
+    subject = Subject(model, architecture, uses)
     architecture.cleanup()
     if late := late_writers(model):
         raise ArchitectureFileError(path, late)
-    _warn(path, file_warnings(model))
     counts = {
         "component": len(model.components),
         "resource": len(model.resources),
@@ -113,30 +131,35 @@ def _check_architecture(path: Path, models: "Iterable[PackageModel]") -> "Archit
     for name, resource in model.resources.items():
         if registry.sequences(resource.type):
             print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, registry):,} bytes")
-    return model
+    return subject
 
 
-def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
+def _check_steps(path: Path, model: "ArchitectureModel | None", uses: "Uses") -> None:
     from mauve_rt.model.steps import load_change  # noqa: PLC0415
     from mauve_rt.supervision.rehearsal import try_change  # noqa: PLC0415
 
     change = load_change(path)
+    uses.steps += change.steps
     if model is not None:
         try_change(path, change, model)
     print(f"{path}: {counted(len(change.steps), 'step')}{_tried_on(model)}: no error found")
 
 
-def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
+def _check_rules(path: Path, model: "ArchitectureModel | None", uses: "Uses") -> None:
     from mauve_rt.supervision.drivers import unbounded_outputs  # noqa: PLC0415
     from mauve_rt.supervision.rule_findings import all_findings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
+    from mauve_rt.supervision.uses import add_uses, unpublished_topics  # noqa: PLC0415
 
     file = RulesFile(path)
+    add_uses(uses, file)
     found = all_findings(file, model)
     if model is not None:
         found += unbounded_outputs(file, model)
     if found:
         raise ArchitectureFileError(path, found)
+    if model is not None:
+        _warn(path, unpublished_topics(file, model, uses))
     print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")
 
 
