@@ -7,7 +7,7 @@ import pytest
 from pyrta_oracle import disagreements
 from schedule_simulation import longest_simulated
 from sporadic_tasks import response_times
-from task_sets import small_set, with_resources
+from task_sets import nearly_full, small_set, with_resources
 from textbook_sets import EXAMPLES
 
 from mauve_rt.analysis import digraph_times
@@ -85,7 +85,7 @@ def exceeded() -> bool:
     """Whether a simulated response time exceeds its bound in some of the sets."""
     for seed in range(1500):
         random = Random(seed)  # noqa: S311 - no cryptography
-        tasks = small_set(random, changed=random.choice((None, with_resources)))
+        tasks = small_set(random, changed=random.choice((None, with_resources, nearly_full)))
         longest = longest_simulated(random, tasks, runs=1)
         bounds = response_times(tasks)
         for task, bound in zip(tasks, bounds, strict=True):

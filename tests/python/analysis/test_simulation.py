@@ -6,12 +6,12 @@ from random import Random
 import pytest
 from schedule_simulation import RUN, Release, longest_simulated, simulate
 from sporadic_tasks import SporadicTask, response_times
-from task_sets import Change, small_set, with_resources
+from task_sets import Change, nearly_full, small_set, with_resources
 
 from mauve_rt.analysis.digraph_times import digraph_times
 
 
-@pytest.mark.parametrize("change", [None, with_resources])
+@pytest.mark.parametrize("change", [None, with_resources, nearly_full])
 def test_no_response_time_exceeds_its_bound(change: Change | None):
     reached = bounded = 0
     for seed in range(1500):
@@ -43,19 +43,22 @@ def test_the_critical_instant_reaches_the_bound():
 
 def test_no_response_time_exceeds_its_bound_where_jobs_wait_for_services():
     """Their waits are part of their costs, and their equals count as higher."""
-    waited = bounded = 0
+    waited = bounded = too_low = 0
     for seed in range(1500):
         random = Random(seed)  # noqa: S311 - no cryptography
-        tasks = small_set(random)
+        tasks = small_set(random, changed=random.choice((None, nearly_full)))
         waits = {task.name: random_waits(random, task.cost_ns) for task in tasks}
         found = digraph_times([task.component(waits_for_services=bool(waits[task.name])) for task in tasks])
         longest = longest_simulated(random, tasks, waits=waits)
+        in_queue = digraph_times([task.component() for task in tasks])
+        too_low += any(longest[name] > (one.response_ns or longest[name]) for name, one in in_queue.items())
         for name, bound in found.items():
             if bound.response_ns is not None:
                 assert longest[name] <= bound.response_ns, f"seed {seed}, task {name}"
                 bounded += 1
                 waited += bool(waits[name])
     assert waited > bounded / 4
+    assert too_low > 0, "bounds of threads that stay in the queue"
 
 
 def random_waits(random: Random, cost_ns: int) -> list[int]:
