@@ -124,9 +124,11 @@ def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, Di
     if unknown:
         return Bound(None, deadline_ns, f"{', '.join(unknown)} may delay it, and nothing is proved of that")
     found = times[subject.name]
-    if subject.machine.clients and found.blocking_ns:
-        names = ", ".join(subject.machine.clients)
-        return Bound(None, deadline_ns, f"after each wait for a service ({names}) a lock may block it anew")
+    caller = _blocked_caller(subject, subjects, times)
+    if caller is not None:
+        names = ", ".join(caller.clients)
+        reason = f"a lock may block {caller.name} again after each wait for a service ({names})"
+        return Bound(None, deadline_ns, reason)
     if found.reason:
         return Bound(None, deadline_ns, found.reason, found.blocking_ns)
     if not found.jobs:
@@ -141,6 +143,23 @@ def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, Di
         walls_ns=found.walls_ns,
         too_long=tuple(_too_long(subject.machine, found.walls_ns)),
     )
+
+
+def _blocked_caller(
+    subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]
+) -> Machine | None:
+    """A component that waits for services and that locks may block: the subject, or one that may delay it.
+
+    While it waits, one of lower priority may lock again: `blocking_ns` covers only one such section.
+    """
+    here = subject.machine
+    callers = (other.machine for other in subjects if other.machine.clients and other.name in times)
+    blocked = [
+        one
+        for one in callers
+        if one.cpus == here.cpus and one.priority >= here.priority and times[one.name].blocking_ns
+    ]
+    return here if here in blocked else next(iter(blocked), None)
 
 
 def _too_long(machine: Machine, walls_ns: Mapping[str, int]) -> Iterator[str]:

@@ -4,8 +4,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 from analysis_machines import MS, connected, execution, machine, wait
+from schedule_simulation import LOCK, RUN, UNLOCK, WAIT, Release, simulate
 
 from mauve_rt.analysis.bounds import Bound, Subject, bounds_of
+from mauve_rt.analysis.digraph_times import Component
 from mauve_rt.analysis.locks import with_measured_holds
 from mauve_rt.analysis.machines import ExecutionTime, Hold, Machine
 from mauve_rt.analysis.obstacles import assumptions_about
@@ -145,7 +147,28 @@ def test_a_wait_for_a_service_counts_as_execution_and_with_locks_nothing_is_prov
     user = loop("user", 3, 20, priority=60, ports=connected(lamp=0, map=1), kinds=kinds)
     found = bounds(user, loop("holder", 2, 50, priority=40, ports=connected(map=1)))
     assert found["user"].response_ns is None
-    assert found["user"].reason == "after each wait for a service (lamp) a lock may block it anew"
+    assert found["user"].reason == "a lock may block user again after each wait for a service (lamp)"
+
+
+def test_a_caller_that_a_lock_may_block_leaves_those_below_it_without_a_bound() -> None:
+    """In each wait of the caller, the holder locks again: the caller comes late, and its next job in time."""
+    caller = loop("caller", 29, 56, priority=60, ports=connected(lamp=0, map=1), kinds={"lamp": "client"})
+    below = loop("below", 10, 200, priority=50)
+    holder = loop("holder", 30, 1000, priority=40, ports=connected(map=10))
+    three_times = [(RUN, 1), (WAIT, 1), (LOCK, "map"), (RUN, 1), (UNLOCK, "map")] * 3
+    releases = {
+        "caller": [Release(at, at, [*three_times, (RUN, 20)]) for at in (0, 56)],
+        "below": [Release(26, 26, [(RUN, 10)])],
+        "holder": [Release(0, 0, [(LOCK, "map"), (RUN, 10), (UNLOCK, "map")] * 3)],
+    }
+    subjects = [Subject.of(one) for one in (caller, below, holder)]
+    components = [Component(one.task, one.machine.priority) for one in subjects]
+    assert simulate(components, releases)["below"] > 10 + 10 + 29, "one job of each"
+    found = bounds(caller, below, holder, loop("above", 1, 100, priority=70))
+    assert found["below"].reason == "a lock may block caller again after each wait for a service (lamp)"
+    assert found["above"].response_ns == 1 * MS
+    elsewhere = replace(below, cpus=(1,))
+    assert bounds(caller, elsewhere, holder)["below"].response_ns == 10 * MS
 
 
 def test_of_whom_a_lock_may_block_for_an_unknown_time_nothing_is_proved() -> None:
