@@ -9,7 +9,7 @@ WATERS 2015, without the angle-synchronous tasks.
 from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
-from math import ceil
+from math import floor
 from random import Random
 from typing import TypeAlias
 
@@ -132,8 +132,8 @@ def with_resources(random: Random, tasks: list[SporadicTask]) -> list[SporadicTa
 
 
 def nearly_full(random: Random, tasks: list[SporadicTask]) -> list[SporadicTask]:
-    """One task takes almost all that the others leave of the processor: busy windows have many jobs."""
+    """One task takes what the others leave of 98 % of the processor: busy windows have many jobs."""
     chosen = random.choice(tasks)
     load = sum(Fraction(task.cost_ns, task.separation_ns) for task in tasks)
-    more_ns = max(0, ceil((1 - load) * chosen.separation_ns) - 1)
+    more_ns = max(0, floor((Fraction(98, 100) - load) * chosen.separation_ns))
     return [replace(task, cost_ns=task.cost_ns + more_ns) if task is chosen else task for task in tasks]
