@@ -32,6 +32,8 @@ class Surroundings:
 
     threads: Any
     """With the fields of mauve_msgs/msg/TaskList."""
+    beside: tuple[Machine, ...] = ()
+    """Threads of other executors on this computer."""
     unknown: tuple[str, ...] = ()
     """What nothing tells, in words."""
     measured: tuple[str, ...] = ()
@@ -55,7 +57,8 @@ def study(
     measured: Mapping[str, Measured] | None = None,
 ) -> Study:
     """An architecture; `measured`: what a recording of it shows, by component."""
-    machines = [*components, *machines_of(surroundings.threads.tasks, components)]
+    threads = machines_of(surroundings.threads.tasks, components)
+    machines = [*components, *threads, *surroundings.beside]
     subjects = [Subject.of(machine, machines, overhead_ns=surroundings.overhead_ns) for machine in machines]
     wakeup_ns = surroundings.wakeup_ns
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)

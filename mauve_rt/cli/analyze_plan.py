@@ -14,7 +14,7 @@ from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.model import ArchitectureModel, PluginIndex
 from mauve_rt.model.file_kinds import FileKind, file_kind
 from mauve_rt.model.fragment import fragment
-from mauve_rt.model.steps import Change, load_change
+from mauve_rt.model.steps import Change, Step, load_change
 from mauve_rt.model.threads import ThreadList, thread_list, uses_of
 from mauve_rt.supervision.rehearsal import before_and_after
 
@@ -54,6 +54,40 @@ def planned(
     later = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
     there = study(machines, later)
     return Plan(study_of_change(now, there, handovers, later), there)
+
+
+class Alternative(NamedTuple):
+    """A core that may take the place of a component's core."""
+
+    component: str
+    core: str
+    is_fallback: bool
+    plan: Plan
+
+
+def alternatives(
+    found: Analyzed, now: Study, components: Sequence[Machine], surroundings: Surroundings
+) -> Iterator[Alternative]:
+    """Each core that an architecture file names as an alternative or a fallback; arguments as planned().
+
+    Raises:
+        ArchitectureFileError: the executor would refuse the core.
+
+    """
+    model = found.model
+    if model is None:
+        raise ValueError("alternatives are judged for an architecture file")
+    index = PluginIndex.installed()
+    for name, part in model.components.items():
+        listed = part.alternatives if isinstance(part.alternatives, list) else []
+        cores = [core for core in listed if index.find("core", core) is not None and core != part.core]
+        for core in dict.fromkeys([*cores, *([part.fallback] if part.fallback else [])]):
+            change = Change(steps=[Step("replace_core", name, core)])
+            machines, threads, handovers = _by_steps(change, model.path, model, components)
+            later = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
+            there = study(machines, later)
+            plan = Plan(study_of_change(now, there, handovers, later), there)
+            yield Alternative(name, core, core == part.fallback, plan)
 
 
 _After = tuple[list[Machine], ThreadList, Handovers]

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Bound, Subject
     from mauve_rt.analysis.machines import Machine
     from mauve_rt.analysis.study import Study, Surroundings
+    from mauve_rt.cli.analyze_plan import Plan
     from mauve_rt.cli.analyzed import Analyzed
 
 _LEAST_MARGIN = 1.0
@@ -35,6 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="MODEL",
         help="take parts of an architecture FILE from this model of a package; may be repeated",
+    )
+    parser.add_argument(
+        "--beside",
+        action="append",
+        default=[],
+        metavar="FILE|NODE",
+        help="another executor on this computer: its threads count, and are not judged; may be repeated",
     )
     parser.add_argument(
         "--budget-from",
@@ -93,6 +101,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="judge a change of an architecture FILE, too, while it is made and after it: by steps, or by "
         "the architecture file after it",
     )
+    parser.add_argument(
+        "--alternatives",
+        action="store_true",
+        help="judge each alternative and fallback core of an architecture FILE, too",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -101,7 +114,7 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.study import study  # noqa: PLC0415
-    from mauve_rt.cli.analyze_plan import planned  # noqa: PLC0415
+    from mauve_rt.cli.analyze_plan import alternatives, planned  # noqa: PLC0415
     from mauve_rt.cli.analyzed import analyzed  # noqa: PLC0415
     from mauve_rt.cli.measured_times import budgets_of, measured_of, statistics_of  # noqa: PLC0415
     from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
@@ -128,25 +141,39 @@ def main(args: argparse.Namespace) -> int:
         for path in args.model
     ]
     plan = planned(args.plan, found, now, components, surroundings) if args.plan is not None else None
+    others = [*alternatives(found, now, components, surroundings)] if args.alternatives else []
     if args.json:
         told = _as_json(now, surroundings, assumptions)
         if plan is not None:
-            told["plan"] = {"during": _plan_json(plan.during), "after": _plan_json(plan.after)}
+            told["plan"] = _plan_json(plan)
+        if args.alternatives:
+            told["alternatives"] = [
+                {"component": each.component, "core": each.core, **_plan_json(each.plan)} for each in others
+            ]
         print(json.dumps(told, indent=2))
     else:
-        from mauve_rt.cli.analyze_view import print_model, print_plan, print_verdict  # noqa: PLC0415
+        from mauve_rt.cli.analyze_view import (  # noqa: PLC0415
+            print_alternative,
+            print_model,
+            print_plan,
+            print_verdict,
+        )
 
         print_model(now, surroundings.threads)
         print_verdict(now, assumptions)
         if plan is not None:
             print_plan(plan)
+        for each in others:
+            print_alternative(each)
     if now.verdict.witness is not None and args.witness is not None:
         from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
 
         machines = [subject.machine for subject in now.subjects]
         write_witness(args.witness, machines, now.verdict.witness)
         print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
-    outcomes = {each.verdict.outcome.name for each in ((now,) if plan is None else (now, *plan))}
+    plans = [*([plan] if plan is not None else []), *(each.plan for each in others)]
+    studies = [now, *(each for one in plans for each in one)]
+    outcomes = {each.verdict.outcome.name for each in studies}
     return next(status for name, status in _STATUSES.items() if name in outcomes)
 
 
@@ -170,14 +197,17 @@ def _wrong_arguments(args: argparse.Namespace) -> str:
         return f"--overhead-ns: expected 0 or more, found {args.overhead_ns}"
     if args.write and (args.budget_from is None or not Path(args.target).is_file()):
         return "--write: expected an architecture FILE and --budget-from BAG"
-    if args.plan is not None and (args.model or not Path(args.target).is_file()):
-        return "--plan: expected an architecture FILE whose parts are installed"
+    judges_changes = args.plan is not None or args.alternatives
+    if judges_changes and (args.model or is_bag(Path(args.target)) or not Path(args.target).is_file()):
+        option = "--plan" if args.plan is not None else "--alternatives"
+        return f"{option}: expected an architecture FILE whose parts are installed"
     return ""
 
 
 def _surroundings(found: "Analyzed", args: argparse.Namespace) -> "Surroundings":
     """The threads, with the costs of a release that the command line says."""
     from mauve_rt.analysis.study import Surroundings  # noqa: PLC0415
+    from mauve_rt.cli.analyzed import machines_beside  # noqa: PLC0415
     from mauve_rt.cli.measured_times import doctor_costs  # noqa: PLC0415
     from mauve_rt.model.threads import ThreadList  # noqa: PLC0415
 
@@ -190,8 +220,10 @@ def _surroundings(found: "Analyzed", args: argparse.Namespace) -> "Surroundings"
     if args.overhead_ns is not None:
         threads = replace(threads, overhead_ns=args.overhead_ns)
     untold = "the bag does not tell which threads run beside the components: record it again"
+    beside = [machine for target in args.beside for machine in machines_beside(target)]
     return Surroundings(
         threads=threads,
+        beside=tuple(beside),
         unknown=() if found.threads is not None else (untold,),
         measured=() if args.doctor is None else ("this computer",),
     )
@@ -249,7 +281,11 @@ def _as_json(now: "Study", surroundings: "Surroundings", assumptions: Sequence[s
     }
 
 
-def _plan_json(study: "Study") -> dict[str, Any]:
+def _plan_json(plan: "Plan") -> dict[str, Any]:
+    return {"during": _study_json(plan.during), "after": _study_json(plan.after)}
+
+
+def _study_json(study: "Study") -> dict[str, Any]:
     return {
         "outcome": study.verdict.outcome,
         "sentence": study.verdict.sentence,

@@ -11,7 +11,7 @@ from mauve_rt.analysis.verdict import Outcome, missing_of
 from mauve_rt.model.threads import ThreadList
 
 if TYPE_CHECKING:
-    from mauve_rt.cli.analyze_plan import Plan
+    from mauve_rt.cli.analyze_plan import Alternative, Plan
 
 
 def print_model(now: Study, threads: ThreadList) -> None:
@@ -57,9 +57,10 @@ def _thread(subject: Subject) -> str:
     if not machine.priority:
         held = ", ".join([*map(str, machine.holds), *machine.undeclared_locks])
         return f"thread '{machine.name}': holds the lock of {held}"
-    (wait, work) = machine.states
-    often = f" every {in_ms(wait.separation_ns)}" if wait.separation_ns != FOREVER_NS else ""
-    return f"thread '{machine.name}': {where}, priority {machine.priority}, {work.time}{often}"
+    cost_ns, often_ns = subject.task.largest_cost_ns, subject.task.shortest_separation_ns
+    cost = "of unknown cost" if cost_ns is None else f"at most {in_ms(cost_ns)}"
+    often = f" every {in_ms(often_ns)}" if often_ns != FOREVER_NS else ""
+    return f"thread '{machine.name}': {where}, priority {machine.priority}, {cost}{often}"
 
 
 def print_verdict(now: Study, assumptions: Sequence[str]) -> None:
@@ -81,6 +82,18 @@ def print_plan(plan: "Plan") -> None:
     for when, found in (("during the change", plan.during), ("after it", plan.after)):
         missing = [*_missing(found)] if found.verdict.outcome == Outcome.NOT_PROVABLE else []
         _print_list(f"{when}: {found.verdict.sentence}", missing)
+
+
+def print_alternative(alternative: "Alternative") -> None:
+    """Print whether the architecture is schedulable with that core, and while it comes in."""
+    kind = "fallback" if alternative.is_fallback else "alternative"
+    head = f"with {kind} {alternative.core} of {alternative.component}"
+    plan = alternative.plan
+    is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
+    worse = plan.during if is_sound else plan.after
+    when = "while it comes in: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
+    missing = [*_missing(worse)] if worse.verdict.outcome == Outcome.NOT_PROVABLE else []
+    _print_list(f"{head}: {when}{worse.verdict.sentence}", missing)
 
 
 def _missing(study: Study) -> Iterator[str]:

@@ -1,11 +1,12 @@
 """What `mauve analyze` takes its model from: an architecture file, the node of an executor, or a bag."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.machines import ExecutionTime, Machine
+from mauve_rt.analysis.threads import machines_of
 from mauve_rt.cli.bag_arguments import is_bag
 from mauve_rt.model.threads import ThreadList
 
@@ -34,6 +35,30 @@ def analyzed(target: str, models: Sequence[Path]) -> Analyzed:
     if not path.exists() and target.startswith("/"):
         return _of_node(target)
     return _of_bag(path) if is_bag(path) else _of_file(path, models)
+
+
+def machines_beside(target: str) -> list[Machine]:
+    """Components and threads of another executor on this computer, as threads that are not judged."""
+    found = analyzed(target, ())
+    name = target if not Path(target).exists() else Path(target).name
+    threads = [] if found.threads is None else machines_of(found.threads.tasks, ())
+    return [_beside(machine, name) for machine in (*found.components, *threads)]
+
+
+def _beside(machine: Machine, executor: str) -> Machine:
+    """With resources of its own; where the interpreter's lock decides, its times are not known."""
+    return replace(
+        machine,
+        name=f"{executor}:{machine.name}",
+        is_component=False,
+        states=tuple(
+            replace(state, time=ExecutionTime()) if machine.is_python else state for state in machine.states
+        ),
+        holds=(),
+        undeclared_locks=(),
+        clients=(),
+        remedy=f"declare the times of {machine.name} in {executor}",
+    )
 
 
 def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:

@@ -116,3 +116,23 @@ def test_a_plan_is_for_a_file(plan: Plan, capsys: pytest.CaptureFixture[str]) ->
     assert main(["analyze", "/robot_1/executor", "--plan", "change.yaml"]) == 2
     why = "mauve: --plan: expected an architecture FILE whose parts are installed\n"
     assert capsys.readouterr().err == why
+
+
+def test_alternatives_and_fallbacks_have_verdicts_of_their_own(plan: Plan) -> None:
+    fallback = "properties: {period_ms: 50}, fallback: executor_tests/Counter"
+    text = TIMED.replace("properties: {period_ms: 50}", fallback)
+    status, out, err = plan(text, AGAIN, "--alternatives")
+    assert (status, err) == (3, "")
+    missing = "not provable: something is missing of"
+    assert f"with alternative executor_tests/HalfTimed of one: {missing} one\n" in out
+    assert f"with alternative executor_tests/Backwards of low: {missing} low\n" in out
+    why = "its new core declares no budget_ns of adopt and take: declare it"
+    assert "with fallback executor_tests/Counter of low: while it comes in: not provable: " in out
+    assert f"  low: {why}\n" in out
+    told = json.loads(plan(text, AGAIN, "--alternatives", "--json")[1])
+    assert [(one["component"], one["core"]) for one in told["alternatives"]] == [
+        ("one", "executor_tests/HalfTimed"),
+        ("low", "executor_tests/Backwards"),
+        ("low", "executor_tests/Counter"),
+    ]
+    assert [one["after"]["outcome"] for one in told["alternatives"]][2] == "schedulable"
