@@ -79,19 +79,22 @@ def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, B
     """
     times: dict[str, DigraphTimes] = {}
     for here in by_cpu(subjects):
-        found = digraph_times([_component(subject, wakeup_ns) for subject in here])
+        found = digraph_times([component_of(subject, jitter_ns=wakeup_ns) for subject in here])
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
     return {
-        subject.name: _bound(subject, subjects, times) for subject in subjects if subject.machine.is_component
+        subject.name: bound_of(subject, subjects, times)
+        for subject in subjects
+        if subject.machine.is_component
     }
 
 
-def _component(subject: Subject, wakeup_ns: int) -> Component:
+def component_of(subject: Subject, *, jitter_ns: int) -> Component:
+    """As the analysis of response times takes it."""
     machine = subject.machine
     return Component(
         subject.task,
         machine.priority,
-        jitter_ns=wakeup_ns,
+        jitter_ns=jitter_ns,
         sections=subject.sections,
         waits_for_services=bool(machine.clients),
         states=tuple((state.name, state.time.ns or 0) for state in machine.states if not state.is_wait),
@@ -102,10 +105,11 @@ def by_cpu(subjects: Sequence[Subject]) -> list[list[Subject]]:
     """Those without obstacles: components of each CPU, and threads that may run there."""
     known = [subject for subject in subjects if not subject.obstacles]
     cpus = sorted({subject.machine.cpus for subject in known if subject.machine.is_component})
-    return [[subject for subject in known if _runs_on(subject.machine, each)] for each in cpus]
+    return [[subject for subject in known if runs_on(subject.machine, each)] for each in cpus]
 
 
-def _runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
+def runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
+    """Whether a component runs on these CPUs, or another thread may."""
     if machine.is_component:
         return machine.cpus == cpus
     return not machine.cpus or bool({*machine.cpus} & {*cpus})
@@ -116,7 +120,8 @@ def delaying(subject: Subject, subjects: Sequence[Subject]) -> list[Subject]:
     return [other for other in subjects if other.obstacles and _may_delay(other, subject, among=subjects)]
 
 
-def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]) -> Bound:
+def bound_of(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]) -> Bound:
+    """Of a component, by the times of its CPU."""
     deadline_ns = min((job.deadline_ns for job in subject.task.jobs), default=0)
     if subject.obstacles:
         return Bound(None, deadline_ns, "it is not provable")

@@ -1,15 +1,15 @@
-"""Response times while a change is made: each participant runs old parts before one instant T, new ones from T on.
+"""Response times while a change is made: each participant has old parts before one instant T, then new ones.
 
-All participants take the change at their first releases at or after the same T. In a busy window that begins at
-0 the change is at x = T - 0, one number for all of them: so the demand of each is that of old jobs released
-before x, then of new jobs, and the worst x counts, not the worst one of each participant. Which x: the demands
-change only where an old job is released, so these instants are tried.
+All participants take the change at their first releases at or after the same T. In a busy window that
+begins at 0 the change is at x = T - 0, one number for all of them. So each asks for old jobs released
+before x, then for new jobs; the worst x of all counts, not the worst one of each participant. The demands
+change only where an old job is released, so these instants x are tried.
 
 Before, a participant's new core adopts the state of the old one, and at x takes it: both together at most
 `handover_ns`, at some instant of a window.
 
-Source: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively scheduled systems", RTSS 1992, for one
-instant instead of a request for each task.
+Source: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively scheduled systems", RTSS 1992, for
+one instant instead of a request for each task.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ _NOTHING = DigraphTask("", ())
 
 @dataclass(frozen=True)
 class Participant:
-    """A component with other parts from T on. One that is added has no old task, one that is removed no new one."""
+    """A component with other parts from T on. An added one has no old task, a removed one no new task."""
 
     old: Component | None
     new: Component | None

@@ -6,6 +6,7 @@ import pytest
 from random_digraphs import random_digraph
 from schedule_simulation import RUN, Release, simulate
 
+from mauve_rt.analysis import change as module
 from mauve_rt.analysis.change import Member, Participant, times_during
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.digraph_times import Component, digraph_times
@@ -127,6 +128,12 @@ def one_run(random: Random, member: Member, change_ns: int, *, until: int, jitte
     return found
 
 
+def test_runs_find_that_only_the_begin_of_a_window_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_instants", lambda _mixes: iter([0]))
+    with pytest.raises(AssertionError, match="seed"):
+        test_no_run_with_a_change_is_above_its_bound(0)
+
+
 @pytest.mark.parametrize("jitter", [0, 3])
 def test_no_run_with_a_change_is_above_its_bound(jitter: int) -> None:
     bounded = reached = 0
@@ -134,7 +141,7 @@ def test_no_run_with_a_change_is_above_its_bound(jitter: int) -> None:
         random = Random(seed)  # noqa: S311 - not for secrets
         members = random_members(random, jitter=jitter)
         found = times_during(members)
-        parts = {name: one for name, one in zip(found, members, strict=True)}
+        parts = dict(zip(found, members, strict=True))
         components = [one.any if isinstance(one, Participant) else one for one in members]
         longest = dict.fromkeys(parts, 0)
         for _ in range(8):
@@ -146,7 +153,7 @@ def test_no_run_with_a_change_is_above_its_bound(jitter: int) -> None:
                 longest[name] = max(longest[name], response_ns)
         for name, one in found.items():
             if one.response_ns is not None:
-                assert longest[name] <= one.response_ns, (seed, name)
+                assert longest[name] <= one.response_ns, f"seed {seed}, {name}"
                 bounded += 1
                 reached += longest[name] == one.response_ns
     assert bounded > 400
