@@ -64,6 +64,8 @@ def test_a_change_between_two_schedulable_architectures_is_not_proved(plan: Plan
     assert told["verdict"]["outcome"] == told["plan"]["after"]["outcome"] == "schedulable"
     assert told["plan"]["during"]["outcome"] == "not proved"
     assert told["plan"]["during"]["responses"]["c"]["response_ns"] == 26_000_000
+    late = json.loads(plan(PAIR, after, "--wakeup-us", "1000", "--json")[1])
+    assert late["plan"]["during"]["responses"]["c"]["response_ns"] == 27_000_000
     assert plan(PAIR, PAIR)[0] == 0, "nothing changes"
 
 
