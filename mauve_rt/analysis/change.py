@@ -12,7 +12,7 @@ Source: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively schedu
 one instant instead of a request for each task.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import takewhile
@@ -76,7 +76,9 @@ def times_during(members: Sequence[Member]) -> dict[str, DigraphTimes]:
     """
     merged = {_name(one): one.merged if isinstance(one, Participant) else one for one in members}
     jitter_ns = max((one.jitter_ns for one in merged.values()), default=0)
-    return {_name(one): _times(one, members, merged, jitter_ns) for one in members}
+    mixes = {_name(one): _Mix(one, jitter_ns) for one in members}
+    loads = {_name(one): _loads(one) for one in members}
+    return {name: _times(name, merged, mixes, loads, jitter_ns) for name in merged}
 
 
 def _name(member: Member) -> str:
@@ -84,30 +86,35 @@ def _name(member: Member) -> str:
 
 
 def _times(
-    one: Member, members: Sequence[Member], merged: dict[str, Component], jitter_ns: int
+    name: str,
+    merged: Mapping[str, Component],
+    mixes: "Mapping[str, _Mix]",
+    loads: Mapping[str, tuple[Fraction, Fraction]],
+    jitter_ns: int,
 ) -> DigraphTimes:
-    own = merged[_name(one)]
-    others = [each for each in members if each is not one]
-    higher = [each for each in others if merged[_name(each)].priority > own.priority]
-    equal = [each for each in others if merged[_name(each)].priority == own.priority]
+    own = merged[name]
+    others = [each for each in merged if each != name]
+    higher = [each for each in others if merged[each].priority > own.priority]
+    equal = [each for each in others if merged[each].priority == own.priority]
     if own.waits_for_services or shares_a_resource(own, merged.values()):
         higher, equal = [*higher, *equal], []
     blocked_ns = blocking_ns(own, [*merged.values()])
-    for load in _loads((one, *higher, *equal)):
+    for each in zip(*(loads[one] for one in (name, *higher, *equal)), strict=True):
+        load = sum(each, start=Fraction(0))
         if load > 1 or (load == 1 and (blocked_ns or jitter_ns)):
             reason = f"the utilization at this priority is {float(load):.4g}: nothing is left"
             return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
+    ranks = ([mixes[each] for each in higher], [mixes[each] for each in equal])
     try:
-        return _worst(one, higher, equal, blocked_ns, jitter_ns)
+        return _worst(mixes[name], ranks, blocked_ns, jitter_ns)
     except UnboundedError as reason:
         return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
 
 
-def _loads(level: Sequence[Member]) -> Iterator[Fraction]:
+def _loads(member: Member) -> tuple[Fraction, Fraction]:
     """Before and after the change."""
-    for is_new in (False, True):
-        tasks = [_task(one, is_new=is_new) for one in level]
-        yield sum(map(utilization_of, tasks), start=Fraction(0))
+    before = utilization_of(_task(member, is_new=False))
+    return before, utilization_of(_task(member, is_new=True)) if isinstance(member, Participant) else before
 
 
 def _task(member: Member, *, is_new: bool) -> DigraphTask:
@@ -117,43 +124,33 @@ def _task(member: Member, *, is_new: bool) -> DigraphTask:
     return _NOTHING if part is None else part.task
 
 
-def _worst(
-    one: Member, higher: Sequence[Member], equal: Sequence[Member], blocking: int, jitter_ns: int
-) -> DigraphTimes:
+_Ranks = tuple[list["_Mix"], list["_Mix"]]
+"""Those of higher priority, and those of equal priority."""
+
+
+def _worst(own: "_Mix", ranks: _Ranks, blocking: int, jitter_ns: int) -> DigraphTimes:
     """The longest of each job, over all instants of the change."""
-    mixes = {id(each): _Mix(each, jitter_ns) for each in (one, *higher, *equal)}
-    ranks = ([mixes[id(each)] for each in higher], [mixes[id(each)] for each in equal])
-    own = mixes[id(one)]
+    mixes = [own, *ranks[0], *ranks[1]]
+    before_ns = _level_at(FOREVER_NS, own, ranks, blocking).window_ns
     longest: dict[Job, int] = {}
     walls: dict[str, int] = {}
-    after_ns = 0  # the end of the window in which nothing has changed yet
-    for change_ns in _instants([*mixes.values()]):
-        for mix in mixes.values():
-            mix.change_at(change_ns)
-        level = _Level(own, *ranks, blocking)
+    for change_ns in _instants([mix for mix in mixes if mix.is_changed]):
+        level = _level_at(change_ns, own, ranks, blocking)
         for path in own.jobs_until(level.window_ns + jitter_ns):
             response_ns = level.finish_ns(path) - (path.release_ns - jitter_ns)
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
         for name, cost_ns in own.states:
             walls[name] = max(level.wall_ns(cost_ns), walls.get(name, 0))
-        after_ns = after_ns or _window_before(mixes, own, ranks, blocking)
-        if change_ns > after_ns + jitter_ns:
+        if change_ns > before_ns + jitter_ns:  # after the window
             break
     jobs = tuple(JobTime(job, response_ns) for job, response_ns in longest.items())
     return DigraphTimes(jobs, blocking_ns=blocking, walls_ns=walls)
 
 
-def _window_before(
-    mixes: dict[int, "_Mix"], own: "_Mix", ranks: "tuple[list[_Mix], list[_Mix]]", blocking: int
-) -> int:
-    """The longest busy window that ends before the change; the mixes are of no instant afterwards."""
-    before = [mix.change_ns for mix in mixes.values()]
-    for mix in mixes.values():
-        mix.change_at(FOREVER_NS)
-    window_ns = _Level(own, *ranks, blocking).window_ns
-    for mix, change_ns in zip(mixes.values(), before, strict=True):
+def _level_at(change_ns: int, own: "_Mix", ranks: _Ranks, blocking: int) -> "_Level":
+    for mix in (own, *ranks[0], *ranks[1]):
         mix.change_at(change_ns)
-    return window_ns
+    return _Level(own, *ranks, blocking)
 
 
 def _instants(mixes: "Sequence[_Mix]") -> Iterator[int]:
@@ -179,21 +176,22 @@ class _Mix:
     def __init__(self, member: Member, jitter_ns: int) -> None:
         self.change_ns = FOREVER_NS
         self._jitter_ns = jitter_ns
-        self._is_changed = isinstance(member, Participant)
+        self.is_changed = isinstance(member, Participant)
         self._old_task = _task(member, is_new=False)
         self._new_task = _task(member, is_new=True)
         self._old, self._new = Demand(self._old_task), Demand(self._new_task)
         self._handover_ns = member.handover_ns if isinstance(member, Participant) else 0
         self.states = _states(member)
-        self._ahead = paths(self._old_task) if self._is_changed else iter(())
+        self._ahead = paths(self._old_task) if self.is_changed else iter(())
         self._found: list[Path] = []  # of the old task, by their releases
         self._switches: list[tuple[int, int]] = []
+        self._switches_at: dict[int, list[tuple[int, int]]] = {}
 
     def change_at(self, change_ns: int) -> None:
         """From now on the answers are for this instant."""
         self.change_ns = change_ns
         self._switches = (
-            [*_pareto(self._all_switches())] if self._is_changed and change_ns < FOREVER_NS else []
+            [*_pareto(self._all_switches())] if self.is_changed and change_ns < FOREVER_NS else []
         )
 
     def old_release_from(self, instant_ns: int) -> int:
@@ -206,7 +204,7 @@ class _Mix:
         if length_ns <= 0:
             return 0
         until_ns = length_ns + self._jitter_ns
-        if not self._is_changed:
+        if not self.is_changed:
             return self._old.in_ns(until_ns)
         work_ns = self._old.in_ns(min(until_ns, self.change_ns))
         for release_ns, before_ns in self._switches:
@@ -221,7 +219,7 @@ class _Mix:
 
     def jobs_until(self, end_ns: int) -> Iterator[Path]:
         """Jobs that are released before then, with the work up to their ends."""
-        if not self._is_changed:
+        if not self.is_changed:
             yield from takewhile(lambda path: path.release_ns < end_ns, paths(self._old_task))
             return
         for path in self._old_before(min(end_ns, self.change_ns)):

@@ -17,77 +17,82 @@ from mauve_rt.model.fragment import fragment
 from mauve_rt.model.steps import Change, Step, load_change
 from mauve_rt.model.threads import ThreadList, thread_list, uses_of
 from mauve_rt.supervision.rehearsal import before_and_after
+from mauve_rt.supervision.rules import RulesFile
 
 _NEW_CORE = ("replace_core", "replace_shell", "configure", "promote")
 """Kinds of steps that put a new instance of the core in, which takes the state of the old one."""
 
 
 class Plan(NamedTuple):
-    """What is known of a change."""
+    """What is known of one change."""
 
+    change: str
+    """In words: `with rule link_lost`; empty: the change that the user names."""
     during: Study
     after: Study
 
 
-def planned(
-    path: Path, found: Analyzed, now: Study, components: Sequence[Machine], surroundings: Surroundings
-) -> Plan:
-    """The change that a file says: of steps, or of the architecture after it.
+class Planner:
+    """The verdicts on changes of an architecture."""
 
-    Args:
-        path: the file.
-        found: the architecture before, of a file.
-        now: what is known of it.
-        components: it has, with their times.
-        surroundings: what runs beside them.
+    def __init__(
+        self, found: Analyzed, now: Study, components: Sequence[Machine], surroundings: Surroundings
+    ) -> None:
+        """Of an architecture file.
 
-    Raises:
-        ArchitectureFileError: the file is no such file, or the executor would refuse a step.
+        Args:
+            found: the architecture before.
+            now: what is known of it.
+            components: it has, with their times.
+            surroundings: what runs beside them.
 
-    """
-    if found.model is None:
-        raise ValueError("a plan is judged for an architecture file")
-    if file_kind(path) is FileKind.ARCHITECTURE:
-        machines, threads, handovers = _by_file(path, found.model)
-    else:
-        machines, threads, handovers = _by_steps(load_change(path), path, found.model, components)
-    later = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
-    there = study(machines, later)
-    return Plan(study_of_change(now, there, handovers, later), there)
+        """
+        if found.model is None:
+            raise ValueError("a change is judged for an architecture file")
+        self._model, self._now = found.model, now
+        self._components, self._surroundings = components, surroundings
 
+    def of_file(self, path: Path) -> Iterator[Plan]:
+        """The changes of a file: of steps, of each rule, or to another architecture.
 
-class Alternative(NamedTuple):
-    """A core that may take the place of a component's core."""
+        Raises:
+            ArchitectureFileError: it is no such file, or the executor would refuse a step.
 
-    component: str
-    core: str
-    is_fallback: bool
-    plan: Plan
+        """
+        kind = file_kind(path)
+        if kind is FileKind.ARCHITECTURE:
+            yield self._judged("", _by_file(path, self._model))
+        elif kind is FileKind.RULES:
+            for rule in RulesFile(path).rules.rules:
+                yield self._by_steps(f"when rule {rule.name} acts", path, Change(steps=list(rule.do)))
+        else:
+            yield self._by_steps("", path, load_change(path))
 
+    def alternatives(self) -> Iterator[Plan]:
+        """Of each core that the file names as an alternative or a fallback.
 
-def alternatives(
-    found: Analyzed, now: Study, components: Sequence[Machine], surroundings: Surroundings
-) -> Iterator[Alternative]:
-    """Each core that an architecture file names as an alternative or a fallback; arguments as planned().
+        Raises:
+            ArchitectureFileError: the executor would refuse the core.
 
-    Raises:
-        ArchitectureFileError: the executor would refuse the core.
+        """
+        index = PluginIndex.installed()
+        for name, part in self._model.components.items():
+            listed = part.alternatives if isinstance(part.alternatives, list) else []
+            cores = [core for core in listed if index.find("core", core) is not None and core != part.core]
+            for core in dict.fromkeys([*cores, *([part.fallback] if part.fallback else [])]):
+                kind = "fallback" if core == part.fallback else "alternative"
+                change = Change(steps=[Step("replace_core", name, core)])
+                yield self._by_steps(f"with {kind} {core} of {name}", self._model.path, change)
 
-    """
-    model = found.model
-    if model is None:
-        raise ValueError("alternatives are judged for an architecture file")
-    index = PluginIndex.installed()
-    for name, part in model.components.items():
-        listed = part.alternatives if isinstance(part.alternatives, list) else []
-        cores = [core for core in listed if index.find("core", core) is not None and core != part.core]
-        for core in dict.fromkeys([*cores, *([part.fallback] if part.fallback else [])]):
-            change = Change(steps=[Step("replace_core", name, core)])
-            machines, threads, handovers = _by_steps(change, model.path, model, components)
-            later = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
-            there = study(machines, later)
-            plan = Plan(study_of_change(now, there, handovers, later), there)
-            yield Alternative(name, core, core == part.fallback, plan)
+    def _by_steps(self, words: str, path: Path, change: Change) -> Plan:
+        return self._judged(words, _by_steps(change, path, self._model, self._components))
+
+    def _judged(self, words: str, after: "_After") -> Plan:
+        machines, threads, handovers = after
+        changed = replace(self._surroundings.threads, tasks=threads.tasks)
+        surroundings = replace(self._surroundings, threads=changed)
+        there = study(machines, surroundings)
+        return Plan(words, study_of_change(self._now, there, handovers, surroundings), there)
 
 
 _After = tuple[list[Machine], ThreadList, Handovers]

@@ -97,9 +97,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--plan",
         type=Path,
-        metavar="STEPS|FILE",
-        help="judge a change of an architecture FILE, too, while it is made and after it: by steps, or by "
-        "the architecture file after it",
+        metavar="STEPS|RULES|FILE",
+        help="judge a change of an architecture FILE, too, while it is made and after it: by steps, by what "
+        "rules do, or by the architecture file after it",
     )
     parser.add_argument(
         "--alternatives",
@@ -114,7 +114,7 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.study import study  # noqa: PLC0415
-    from mauve_rt.cli.analyze_plan import alternatives, planned  # noqa: PLC0415
+    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
     from mauve_rt.cli.analyzed import analyzed  # noqa: PLC0415
     from mauve_rt.cli.measured_times import budgets_of, measured_of, statistics_of  # noqa: PLC0415
     from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
@@ -140,20 +140,18 @@ def main(args: argparse.Namespace) -> int:
         f"the parts of {path} are written in C++, but for implementations with a module"
         for path in args.model
     ]
-    plan = planned(args.plan, found, now, components, surroundings) if args.plan is not None else None
-    others = [*alternatives(found, now, components, surroundings)] if args.alternatives else []
+    plans: list[Plan] = []
+    if args.plan is not None or args.alternatives:
+        planner = Planner(found, now, components, surroundings)
+        plans += planner.of_file(args.plan) if args.plan is not None else ()
+        plans += planner.alternatives() if args.alternatives else ()
     if args.json:
         told = _as_json(now, surroundings, assumptions)
-        if plan is not None:
-            told["plan"] = _plan_json(plan)
-        if args.alternatives:
-            told["alternatives"] = [
-                {"component": each.component, "core": each.core, **_plan_json(each.plan)} for each in others
-            ]
+        if args.plan is not None or args.alternatives:
+            told["changes"] = [_plan_json(plan) for plan in plans]
         print(json.dumps(told, indent=2))
     else:
         from mauve_rt.cli.analyze_view import (  # noqa: PLC0415
-            print_alternative,
             print_model,
             print_plan,
             print_verdict,
@@ -161,18 +159,15 @@ def main(args: argparse.Namespace) -> int:
 
         print_model(now, surroundings.threads)
         print_verdict(now, assumptions)
-        if plan is not None:
+        for plan in plans:
             print_plan(plan)
-        for each in others:
-            print_alternative(each)
     if now.verdict.witness is not None and args.witness is not None:
         from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
 
         machines = [subject.machine for subject in now.subjects]
         write_witness(args.witness, machines, now.verdict.witness)
         print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
-    plans = [*([plan] if plan is not None else []), *(each.plan for each in others)]
-    studies = [now, *(each for one in plans for each in one)]
+    studies = [now, *(each for plan in plans for each in (plan.during, plan.after))]
     outcomes = {each.verdict.outcome.name for each in studies}
     return next(status for name, status in _STATUSES.items() if name in outcomes)
 
@@ -282,7 +277,11 @@ def _as_json(now: "Study", surroundings: "Surroundings", assumptions: Sequence[s
 
 
 def _plan_json(plan: "Plan") -> dict[str, Any]:
-    return {"during": _study_json(plan.during), "after": _study_json(plan.after)}
+    return {
+        "change": plan.change,
+        "during": _study_json(plan.during),
+        "after": _study_json(plan.after),
+    }
 
 
 def _study_json(study: "Study") -> dict[str, Any]:

@@ -11,7 +11,7 @@ from mauve_rt.analysis.verdict import Outcome, missing_of
 from mauve_rt.model.threads import ThreadList
 
 if TYPE_CHECKING:
-    from mauve_rt.cli.analyze_plan import Alternative, Plan
+    from mauve_rt.cli.analyze_plan import Plan
 
 
 def print_model(now: Study, threads: ThreadList) -> None:
@@ -78,22 +78,20 @@ def print_verdict(now: Study, assumptions: Sequence[str]) -> None:
 
 
 def print_plan(plan: "Plan") -> None:
-    """Print the verdicts on a change."""
-    for when, found in (("during the change", plan.during), ("after it", plan.after)):
-        missing = [*_missing(found)] if found.verdict.outcome == Outcome.NOT_PROVABLE else []
-        _print_list(f"{when}: {found.verdict.sentence}", missing)
+    """Print the verdicts on a change; of one with a name the worse one."""
+    if plan.change:
+        is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
+        worse = plan.during if is_sound else plan.after
+        when = "while that is made: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
+        _print_study(f"{plan.change}: {when}", worse)
+    else:
+        _print_study("during the change: ", plan.during)
+        _print_study("after it: ", plan.after)
 
 
-def print_alternative(alternative: "Alternative") -> None:
-    """Print whether the architecture is schedulable with that core, and while it comes in."""
-    kind = "fallback" if alternative.is_fallback else "alternative"
-    head = f"with {kind} {alternative.core} of {alternative.component}"
-    plan = alternative.plan
-    is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
-    worse = plan.during if is_sound else plan.after
-    when = "while it comes in: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
-    missing = [*_missing(worse)] if worse.verdict.outcome == Outcome.NOT_PROVABLE else []
-    _print_list(f"{head}: {when}{worse.verdict.sentence}", missing)
+def _print_study(head: str, study: Study) -> None:
+    missing = [*_missing(study)] if study.verdict.outcome == Outcome.NOT_PROVABLE else []
+    _print_list(f"{head}{study.verdict.sentence}", missing)
 
 
 def _missing(study: Study) -> Iterator[str]:

@@ -61,11 +61,11 @@ def test_a_change_between_two_schedulable_architectures_is_not_proved(plan: Plan
         "after it: schedulable: every component meets its deadline\n"
     )
     told = json.loads(plan(PAIR, after, "--json")[1])
-    assert told["verdict"]["outcome"] == told["plan"]["after"]["outcome"] == "schedulable"
-    assert told["plan"]["during"]["outcome"] == "not proved"
-    assert told["plan"]["during"]["responses"]["c"]["response_ns"] == 26_000_000
+    assert told["verdict"]["outcome"] == told["changes"][0]["after"]["outcome"] == "schedulable"
+    assert told["changes"][0]["during"]["outcome"] == "not proved"
+    assert told["changes"][0]["during"]["responses"]["c"]["response_ns"] == 26_000_000
     late = json.loads(plan(PAIR, after, "--wakeup-us", "1000", "--json")[1])
-    assert late["plan"]["during"]["responses"]["c"]["response_ns"] == 27_000_000
+    assert late["changes"][0]["during"]["responses"]["c"]["response_ns"] == 27_000_000
     assert plan(PAIR, PAIR)[0] == 0, "nothing changes"
 
 
@@ -74,10 +74,10 @@ def test_a_change_by_steps_with_its_handover(plan: Plan) -> None:
     assert (status, err) == (0, "")
     told = json.loads(out)
     now = {one["name"]: one["response"]["response_ns"] for one in told["components"]}
-    during = {name: one["response_ns"] for name, one in told["plan"]["during"]["responses"].items()}
+    during = {name: one["response_ns"] for name, one in told["changes"][0]["during"]["responses"].items()}
     assert during["one"] == now["one"] + 100_000, "its core declares budget_ns"
     assert during["low"] == now["low"] + 100_000
-    after = {name: one["response_ns"] for name, one in told["plan"]["after"]["responses"].items()}
+    after = {name: one["response_ns"] for name, one in told["changes"][0]["after"]["responses"].items()}
     assert after == now
 
 
@@ -104,7 +104,7 @@ def test_one_that_is_added_delays_those_below(plan: Plan) -> None:
     told = json.loads(out)
     now = {one["name"]: one["response"]["response_ns"] for one in told["components"]}
     for when in ("during", "after"):
-        found = {name: one["response_ns"] for name, one in told["plan"][when]["responses"].items()}
+        found = {name: one["response_ns"] for name, one in told["changes"][0][when]["responses"].items()}
         assert found == {"one": now["one"] + 3_000_000, "low": now["low"] + 3_000_000, "more": 3_000_000}
 
 
@@ -129,12 +129,32 @@ def test_alternatives_and_fallbacks_have_verdicts_of_their_own(plan: Plan) -> No
     assert f"with alternative executor_tests/HalfTimed of one: {missing} one\n" in out
     assert f"with alternative executor_tests/Backwards of low: {missing} low\n" in out
     why = "its new core declares no budget_ns of adopt and take: declare it"
-    assert "with fallback executor_tests/Counter of low: while it comes in: not provable: " in out
+    assert "with fallback executor_tests/Counter of low: while that is made: not provable: " in out
     assert f"  low: {why}\n" in out
     told = json.loads(plan(text, AGAIN, "--alternatives", "--json")[1])
-    assert [(one["component"], one["core"]) for one in told["alternatives"]] == [
-        ("one", "executor_tests/HalfTimed"),
-        ("low", "executor_tests/Backwards"),
-        ("low", "executor_tests/Counter"),
+    assert [one["change"] for one in told["changes"]] == [
+        "",
+        "with alternative executor_tests/HalfTimed of one",
+        "with alternative executor_tests/Backwards of low",
+        "with fallback executor_tests/Counter of low",
     ]
-    assert [one["after"]["outcome"] for one in told["alternatives"]][2] == "schedulable"
+    assert told["changes"][-1]["after"]["outcome"] == "schedulable"
+
+
+RULES = """\
+mauve: 1
+rules:
+  - name: again
+    when: {fault: {component: low}}
+    do: [{kind: replace_core, target: one, name: executor_tests/Timed}]
+  - name: halves
+    when: {fault: {component: low}}
+    do: [{kind: replace_core, target: one, name: executor_tests/HalfTimed}]
+"""
+
+
+def test_what_each_rule_does_is_judged(plan: Plan) -> None:
+    status, out, err = plan(TIMED, RULES)
+    assert (status, err) == (3, "")
+    assert "when rule again acts: schedulable: every component meets its deadline\n" in out
+    assert "when rule halves acts: not provable: something is missing of one\n" in out
