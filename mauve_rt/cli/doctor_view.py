@@ -12,6 +12,7 @@ from mauve_rt.doctor.wakeup import CpuWakeup, Wakeup
 _STYLES = {Status.OK: "green", Status.WARNING: "yellow", Status.ERROR: "bold red"}
 _WORDS = {Status.OK: "OK", Status.WARNING: "warning", Status.ERROR: "error"}
 _STATUS_WIDTH, _NAME_WIDTH, _BAR_WIDTH = 8, 20, 40
+_LONGEST = 400  # of a line; --json has all of it
 
 
 def print_finding(finding: Finding) -> None:
@@ -22,7 +23,8 @@ def print_finding(finding: Finding) -> None:
     out.print(f"[{_STYLES[finding.status]}]{word}[/]{line}", soft_wrap=True)
     for what, text in (("cost", finding.cost), ("remedy", finding.remedy)):
         if text:
-            out.print(f"{' ' * _STATUS_WIDTH}[dim]{what}:[/] {escape(text)}", soft_wrap=True)
+            shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}... (whole in --json)"
+            out.print(f"{' ' * _STATUS_WIDTH}[dim]{what}:[/] {escape(shown)}", soft_wrap=True)
 
 
 def print_wakeup(wakeup: Wakeup) -> None:

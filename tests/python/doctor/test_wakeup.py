@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from mauve_rt.cli.doctor_view import print_finding, print_summary, print_wakeup
-from mauve_rt.doctor.finding import Status, error, ok
+from mauve_rt.doctor.finding import Status, error, ok, warning
 from mauve_rt.doctor.wakeup import CpuWakeup, Wakeup, describe, measure
 
 CPU = CpuWakeup(
@@ -78,3 +78,10 @@ def test_cost_and_remedy_stand_beneath_a_finding(capsys: pytest.CaptureFixture[s
         "remedy: rm [a]",
     ]
     assert lines[-1] == "1 error, 0 warnings"
+
+
+def test_a_long_remedy_is_cut(capsys: pytest.CaptureFixture[str]) -> None:
+    print_finding(warning("82 files", cost="memory", remedy="rm " + "/dev/shm/x " * 82))
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1].endswith("... (whole in --json)")
+    assert len(lines[-1]) < 500
