@@ -249,15 +249,13 @@ def _of_file(path: Path, models: Sequence[Path]) -> _Model:
     from mauve_rt.model import PluginIndex, build, load_architecture, previewed_states  # noqa: PLC0415
     from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
     from mauve_rt.model.threads import thread_list, uses_of  # noqa: PLC0415
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+    from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     model = load_architecture(path, runs_here=False)
-    registry, index = PluginRegistry(), PluginIndex.installed()
-    in_python: dict[str, bool] = {}
-    for each in models:
-        found = load_model(each)
-        index = add_modelled_parts(found, registry, index)
-        in_python |= _modelled(found)
+    registry, loader = PluginRegistry(), ModelLoader(models)
+    found = [loader.load(each) for each in models]
+    index = add_modelled_parts(found, registry, PluginIndex.installed())
+    in_python = {name: is_one for each in found for name, is_one in _modelled(each).items()}
     architecture = build(model, registry, index=index)
     states = previewed_states(model, architecture)
     kinds = {resource.name: resource.kind for resource in architecture.resources()}

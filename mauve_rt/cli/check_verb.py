@@ -18,6 +18,7 @@ if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wa
 
     from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
+    from mauve_rt.modelling.loading import ModelLoader
     from mauve_rt.modelling.package_model import PackageModel
 
 
@@ -47,13 +48,16 @@ def main(args: argparse.Namespace) -> int:
     if len(architectures) > 1 and len(kinds) > len(architectures):
         print("mauve: check steps and rules with one architecture file, not with several", file=sys.stderr)
         return BAD_USAGE
+    from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
+
     status, model = OK, None
     models: list[PackageModel] = []
+    loader = ModelLoader(path for path, kind in kinds.items() if kind is FileKind.MODEL)
     order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
     for path in sorted(kinds, key=lambda path: order.index(kinds[path])):
         try:
             if kinds[path] is FileKind.MODEL:
-                models.append(_check_model(path))
+                models.append(_check_model(path, loader))
             elif kinds[path] is FileKind.ARCHITECTURE:
                 model = _check_architecture(path, models)
             else:
@@ -68,10 +72,8 @@ def _tell(error: ArchitectureFileError) -> int:
     return BAD_USAGE
 
 
-def _check_model(path: Path) -> "PackageModel":
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
-
-    model = load_model(path)
+def _check_model(path: Path, loader: "ModelLoader") -> "PackageModel":
+    model = loader.load(path)
     _warn(path, model.warnings)
     content = model.content
     counts = {"shell": len(content.shells), "core": len(content.cores), "fsm": len(content.fsms)}
@@ -94,9 +96,8 @@ def _check_architecture(path: Path, models: "Iterable[PackageModel]") -> "Archit
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
-    registry, index = PluginRegistry(), PluginIndex.installed()
-    for each in models:
-        index = add_modelled_parts(each, registry, index)
+    registry = PluginRegistry()
+    index = add_modelled_parts(models, registry, PluginIndex.installed())
     architecture = build(model, registry, index=index)
     configure(model, architecture)
     architecture.cleanup()

@@ -34,7 +34,7 @@ def main(args: argparse.Namespace) -> int:
         write_generated,
         write_skeletons,
     )
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+    from mauve_rt.modelling.loading import load_model  # noqa: PLC0415
 
     try:
         model = load_model(args.model)

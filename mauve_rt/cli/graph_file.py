@@ -102,9 +102,8 @@ def with_rules(drawing: Drawing, path: Path, topics: Topics) -> Drawing:
 
 
 def _built(model: ArchitectureModel, models: Sequence[PackageModel]) -> Architecture:
-    registry, index = PluginRegistry(), PluginIndex.installed()
-    for one in models:
-        index = add_modelled_parts(one, registry, index)
+    registry = PluginRegistry()
+    index = add_modelled_parts(models, registry, PluginIndex.installed())
     return build(model, registry, index=index)
 
 

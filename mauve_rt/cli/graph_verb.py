@@ -123,7 +123,7 @@ def _of_files(kinds: "Kinds", args: argparse.Namespace) -> "tuple[Drawing, Any]"
     from mauve_rt.cli.graph_file import Topics, drawing_of_file, fsm_of_file  # noqa: PLC0415
     from mauve_rt.cli.graph_model import drawing_of_model, fsm_of_model  # noqa: PLC0415
     from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+    from mauve_rt.modelling.loading import load_model  # noqa: PLC0415
 
     models = [load_model(path) for path, kind in kinds.items() if kind is FileKind.MODEL]
     for path, kind in kinds.items():

@@ -4,7 +4,8 @@ The kernel runs what is generated from the model in Python; actions do nothing, 
 drawings and the timing analysis of a model take what the generated code will be, not a second picture of it.
 """
 
-from types import ModuleType
+from collections.abc import Iterable
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from mauve_rt._kernel import PluginRegistry
@@ -18,11 +19,34 @@ from mauve_rt.parts import resources
 from mauve_rt.parts.message_types import promise
 
 
-def add_modelled_parts(model: PackageModel, registry: PluginRegistry, index: PluginIndex) -> PluginIndex:
-    """Register the parts of a model in the place of installed ones; returns the index of all others."""
-    promise(own_types(model))
+def add_modelled_parts(
+    models: Iterable[PackageModel], registry: PluginRegistry, index: PluginIndex
+) -> PluginIndex:
+    """Register the parts of models in the place of installed ones; returns the index of all others.
+
+    Parts of models that these use, and that are not among them, are the installed ones.
+    """
+    given = {model.package: model for model in models}
+    order = {one.package: one for model in given.values() for one in (*model.closure(), model)}
+    for package, model in order.items():  # a shell before what needs it
+        if package in given:
+            _add(model, registry)
+            index = index.without(package)
+    return index
+
+
+def _module(model: PackageModel) -> ModuleType:
+    """The generated module, as if it were installed."""
     module = ModuleType(f"{parts_module(model.package)}.model")
-    exec(python_module(model), vars(module))  # noqa: S102 - its names were checked
+    for one in model.closure():
+        setattr(module, parts_module(one.package), SimpleNamespace(model=_module(one)))
+    exec(python_module(model, has_imports=False), vars(module))  # noqa: S102 - its names were checked
+    return module
+
+
+def _add(model: PackageModel, registry: PluginRegistry) -> None:
+    promise(own_types(model))
+    module = _module(model)
     for name in model.content.shells:
         registry.shell(model.registered(name), getattr(module, name))
     for name, core in model.content.cores.items():
@@ -34,7 +58,6 @@ def add_modelled_parts(model: PackageModel, registry: PluginRegistry, index: Plu
         registry.fsm(model.registered(name), getattr(module, name), model.registered(shell))
     for name, resource in model.content.resources.items():
         registry.resource(model.registered(name), _resource(name, resource))
-    return index.without(model.package)
 
 
 def _without_algorithm(name: str, core: CoreModel, abstract: type[Any]) -> type[Any]:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, MauveError
 from mauve_rt.modelling.generate import generated, interfaces, messages, write_generated
-from mauve_rt.modelling.package_model import load_model
+from mauve_rt.modelling.loading import load_model
 
 
 def main() -> int:

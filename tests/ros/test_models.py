@@ -13,7 +13,7 @@ from mauve_rt._kernel import PluginRegistry
 from mauve_rt.cli.main import main
 from mauve_rt.model.plugins import PluginIndex, PluginLoader, parse_index
 from mauve_rt.model.registered_model import registered_model
-from mauve_rt.modelling.package_model import load_model
+from mauve_rt.modelling.loading import load_model
 from mauve_rt.yaml.writer import write_yaml
 
 GUIDANCE = Path(__file__).parents[1] / "python/modelling/guidance.yaml"

@@ -7,7 +7,7 @@ import pytest
 from page_blocks import blocks
 
 from mauve_rt.cli.main import main
-from mauve_rt.modelling.package_model import load_model
+from mauve_rt.modelling.loading import load_model
 
 ROOT = Path(__file__).parents[3]
 GUIDANCE = ROOT / "tests/python/modelling/guidance.yaml"
