@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="models, and files of an architecture, rules or steps; beside an architecture file, "
-        "steps and rules are tried on it, and models give it parts",
+        "steps and rules are tried on it, and models give it parts. Models may use parts of each other",
     )
 
 
@@ -51,6 +51,7 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     status, model = OK, None
+    printed: set[str] = set()  # a model that others use is wrong once
     models: list[PackageModel] = []
     loader = ModelLoader(path for path, kind in kinds.items() if kind is FileKind.MODEL)
     order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
@@ -63,12 +64,16 @@ def main(args: argparse.Namespace) -> int:
             else:
                 (_check_rules if kinds[path] is FileKind.RULES else _check_steps)(path, model)
         except ArchitectureFileError as error:
-            status = _tell(error)
+            status = _tell(error, printed)
     return status
 
 
-def _tell(error: ArchitectureFileError) -> int:
-    print("\n".join(error.lines()), file=sys.stderr)
+def _tell(error: ArchitectureFileError, printed: "set[str] | None" = None) -> int:
+    printed = set() if printed is None else printed
+    for line in error.lines():
+        if line not in printed:
+            print(line, file=sys.stderr)
+            printed.add(line)
     return BAD_USAGE
 
 

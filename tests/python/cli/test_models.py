@@ -98,6 +98,66 @@ def test_a_model_alone_is_proved_schedulable(model: Path, capfd: pytest.CaptureF
     assert (status, told["verdict"]["outcome"]) == (1, "not schedulable")
 
 
+ARM = """\
+mauve_model: 1
+package: my_arm
+cores:
+  Follower:
+    shell: my_robot/GuidanceShell
+    actions: [follow]
+    implementations: {Eager: {wcet: {follow: 2 ms}}}
+fsms:
+  FollowerFsm:
+    core: Follower
+    initial: Follow
+    states: {Follow: {run: follow, next: Rest}, Rest: {wait: 2 * unit_ms, next: Follow}}
+"""
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    """A model that uses a shell of the Guidance's."""
+    path = tmp_path / "arm.yaml"
+    path.write_text(ARM, encoding="utf-8")
+    return path
+
+
+def arm_robot(folder: Path) -> Path:
+    path = Path(robot(folder, core="Eager"))
+    text = path.read_text().replace("my_robot/Eager", "my_arm/Eager")
+    text = text.replace("    alternatives: [my_robot/StraightGuidance]\n", "")
+    path.write_text(text.replace("my_robot/GuidanceFsm", "my_arm/FollowerFsm"))
+    return path
+
+
+def test_a_model_uses_parts_of_another_one(
+    model: Path, arm: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    path = arm_robot(model.parent)
+    assert main(["check", str(arm)]) == 2
+    assert f"{arm}:5:12: package 'my_robot' is not found" in capfd.readouterr().err
+    assert main(["check", str(path), str(arm), str(model)]) == 0
+    assert f"{arm}: 0 shells, 1 core, 1 fsm: no error found\n" in capfd.readouterr().out
+
+    assert main(["analyze", str(path), "--model", str(arm), "--model", str(model), "--json"]) == 0
+    [component] = json.loads(capfd.readouterr().out)["components"]
+    assert component["states"][0]["time_ns"] == 2_000_000
+
+    assert main(["graph", str(arm), str(model)]) == 0
+    assert "my_robot/GuidanceShell" in capfd.readouterr().out
+    assert main(["graph", str(arm), str(model), "--fsm", "FollowerFsm"]) == 0
+    assert "2 * unit_ms" in capfd.readouterr().out
+
+    assert main(["generate", str(arm), str(model)]) == 0
+    assert (arm.parent / "build/generated/include/my_arm/model/follower_core.hpp").is_file()
+
+
+def test_a_wrong_model_is_told_once(model: Path, arm: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    model.write_text(model.read_text().replace("next: W5", "next: W6"))
+    assert main(["check", str(arm), str(model)]) == 2
+    assert capfd.readouterr().err.count("there is no state 'W6'") == 1
+
+
 def test_a_missing_worst_case_is_not_provable(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
     model.write_text(model.read_text().replace("compute_path: 5 ms, ", ""))
     status, told = verdict(robot(model.parent), model, capfd)
