@@ -14,7 +14,7 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
     from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
@@ -92,7 +92,7 @@ def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
 
 
-def _check_architecture(path: Path, models: "Iterable[PackageModel]") -> "ArchitectureModel":
+def _check_architecture(path: Path, models: "Sequence[PackageModel]") -> "ArchitectureModel":
     from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
     from mauve_rt.model import PluginIndex, build, configure, load_architecture  # noqa: PLC0415

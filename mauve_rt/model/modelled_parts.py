@@ -4,7 +4,7 @@ The kernel runs what is generated from the model in Python; actions do nothing, 
 drawings and the timing analysis of a model take what the generated code will be, not a second picture of it.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from types import ModuleType, SimpleNamespace
 from typing import Any
 
@@ -16,37 +16,44 @@ from mauve_rt.modelling.package_model import PackageModel
 from mauve_rt.modelling.python import own_types, parts_module
 from mauve_rt.modelling.schema import CoreModel, CppCall, ParameterModel, ResourceModel
 from mauve_rt.parts import resources
+from mauve_rt.parts.cores import Core, Shell
 from mauve_rt.parts.message_types import promise
 
 
 def add_modelled_parts(
-    models: Iterable[PackageModel], registry: PluginRegistry, index: PluginIndex
+    models: Sequence[PackageModel], registry: PluginRegistry, index: PluginIndex
 ) -> PluginIndex:
     """Register the parts of models in the place of installed ones; returns the index of all others.
 
     Parts of models that these use, and that are not among them, are the installed ones.
     """
-    given = {model.package: model for model in models}
-    order = {one.package: one for model in given.values() for one in (*model.closure(), model)}
-    for package, model in order.items():  # a shell before what needs it
-        if package in given:
-            _add(model, registry)
-            index = index.without(package)
+    given = {model.package for model in models}
+    modules: dict[str, object] = {}
+    for model in _used_first(models):
+        promise(own_types(model))
+        if model.package in given:
+            modules[model.package] = _add(model, modules, registry)
+            index = index.without(model.package)
+        else:
+            modules[model.package] = _bases(model)
     return index
 
 
-def _module(model: PackageModel) -> ModuleType:
-    """The generated module, as if it were installed."""
+def _used_first(models: Sequence[PackageModel]) -> Iterable[PackageModel]:
+    return {one.package: one for model in models for one in (*model.closure(), model)}.values()
+
+
+def _bases(model: PackageModel) -> object:
+    """What parts of an installed package are, in C++ or in Python."""
+    shells = dict.fromkeys(model.content.shells, Shell)
+    return SimpleNamespace(**shells, **{abstract_class(name): Core for name in model.content.cores})
+
+
+def _add(model: PackageModel, used: Mapping[str, object], registry: PluginRegistry) -> object:
+    """Register the parts of a model; returns its module, for models that use it."""
     module = ModuleType(f"{parts_module(model.package)}.model")
-    for one in model.closure():
-        setattr(module, parts_module(one.package), SimpleNamespace(model=_module(one)))
+    vars(module).update({parts_module(one): SimpleNamespace(model=part) for one, part in used.items()})
     exec(python_module(model, has_imports=False), vars(module))  # noqa: S102 - its names were checked
-    return module
-
-
-def _add(model: PackageModel, registry: PluginRegistry) -> None:
-    promise(own_types(model))
-    module = _module(model)
     for name in model.content.shells:
         registry.shell(model.registered(name), getattr(module, name))
     for name, core in model.content.cores.items():
@@ -58,6 +65,7 @@ def _add(model: PackageModel, registry: PluginRegistry) -> None:
         registry.fsm(model.registered(name), getattr(module, name), model.registered(shell))
     for name, resource in model.content.resources.items():
         registry.resource(model.registered(name), _resource(name, resource))
+    return module
 
 
 def _without_algorithm(name: str, core: CoreModel, abstract: type[Any]) -> type[Any]:

@@ -61,16 +61,15 @@ class ModelLoader:
     def _used(self, file: YamlFile, content: ModelFile) -> dict[str, PackageModel]:
         used: dict[str, PackageModel] = {}
         found: list[Problem] = []
-        for reference in references(content):
-            if reference.package in used:
-                continue
-            path = self._path(reference.package)
-            if reference.package in self._reading:
+        first = {one.package: one for one in reversed([*references(content)])}
+        for package, reference in first.items():
+            path = self._path(package)
+            if package in self._reading:
                 found.append(self._cycle(file, reference))
             elif path is None:
                 found.append(self._missing(file, reference))
             else:
-                used[reference.package] = self.load(path)
+                used[package] = self.load(path)
         if found:
             raise ArchitectureFileError(file.path, found)
         return used

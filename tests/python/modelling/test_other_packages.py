@@ -120,13 +120,13 @@ def test_a_given_model_goes_before_the_installed_one(tmp_path: Path, monkeypatch
 def test_an_unknown_package_is_refused_at_its_place(tmp_path: Path) -> None:
     text = ARM.replace("core: my_robot/Guidance\n", "core: my_robt/Guidance\n")
     told = refused(tmp_path, text, GUIDANCE)
-    assert "model.yaml:29:11: package 'my_robt' is not found; did you mean my_robot?" in told
+    assert "model.yaml:28:11: package 'my_robt' is not found; did you mean my_robot?" in told
 
 
 def test_a_package_without_a_model_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed(monkeypatch, tmp_path / "prefix", "my_robot", "")
     told = refused(tmp_path, ARM)
-    assert "model.yaml:4:16: package 'my_robot' has no model: expected share/my_robot/model.yaml" in told
+    assert "model.yaml:4:15: package 'my_robot' has no model: expected share/my_robot/model.yaml" in told
     assert told.endswith("of a message write my_robot/msg/Point2D")
 
 
@@ -139,7 +139,7 @@ def test_a_package_without_a_model_is_refused(tmp_path: Path, monkeypatch: pytes
             "15:12: package 'my_robot' has no shell 'GuidanceShel' in its model; did you mean GuidanceShell?",
         ),
         ("core: my_robot/Guidance\n", "core: my_robot/Guidence\n", "has no core 'Guidence' in its model; did"),
-        ("write: my_robot/Point2D", "write: my_robot/Pont2D", "7:44: package 'my_robot' has no type 'Pont2D'"),
+        ("write: my_robot/Point2D", "write: my_robot/Pont2D", "7:49: package 'my_robot' has no type 'Pont2D'"),
         ("run: compute_path", "run: compute", "core 'my_robot/Guidance' has no action 'compute'; did you mean"),
         ("wait: 5 * unit_ms", "wait: 5 * unit", "there is no property 'unit'; did you mean unit_ms?"),
         ("read: Reach", "read: my_arm/Reach", "package 'my_arm' is the one of this model; write Reach"),
