@@ -58,6 +58,7 @@ class _Reading:
         self._registry = loader.registry
         self._model = RegisteredModel({})
         self._types: Mapped = {}
+        self._packages = {name.partition("/")[0] for name in loader.names("shell")}
 
     def result(self) -> RegisteredModel:
         names = {
@@ -153,7 +154,7 @@ class _Reading:
         shell = self._registry.fsm_shell(name)
         package, _, class_name = abstract.rpartition("/")
         core = _core_name(class_name, shell)
-        if package not in ("", self._package):
+        if package != self._package and package in self._packages:
             core = f"{package}/{core}"  # of another package's model
         else:
             known = cores.setdefault(core, {"shell": self._own(shell), "actions": [], "guards": []})

@@ -108,12 +108,13 @@ def _messages(model: PackageModel) -> Iterator[tuple[str, str]]:
     """The .msg files of the model's structs."""
     for name, own in model.content.types.items():
         if isinstance(own, Mapping):
-            lines = "".join(f"{_in_message(model, of)} {field}\n" for field, of in own.items())
+            lines = "".join(f"{_in_message(of)} {field}\n" for field, of in own.items())
             yield f"msg/{name}.msg", f"# {_mark(model)}\n{lines}"
 
 
-def _in_message(model: PackageModel, of: TypeName) -> str:
-    return of.text.replace(of.item, model.registered_type(of.item)) if of.is_of_model else of.text
+def _in_message(of: TypeName) -> str:
+    """As .msg files have it: they name a message of another package as package/Name."""
+    return of.text.replace("/msg/", "/")
 
 
 def _cpp_files(model: PackageModel) -> Iterator[tuple[str, str]]:

@@ -84,7 +84,7 @@ def installed(monkeypatch: pytest.MonkeyPatch, prefix: Path, package: str, model
 def test_parts_of_another_model_become_code_that_names_its_package(tmp_path: Path) -> None:
     model = load(tmp_path, ARM, GUIDANCE)
     files = generated(model)
-    assert files["msg/Reach.msg"].endswith("\nmy_robot/msg/Point2D[<=4] at\n")
+    assert files["msg/Reach.msg"].endswith("\nmy_robot/Point2D[<=4] at\n")
     fsm = files["include/my_arm/model/slow_guidance_fsm.hpp"]
     assert "#include <my_robot/model/guidance_core.hpp>\n" in fsm
     assert "mauve::Fsm<::my_robot::GuidanceShell, ::my_robot::GuidanceCore>" in fsm
