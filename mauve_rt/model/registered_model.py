@@ -149,9 +149,10 @@ class _Reading:
         }
 
     def _fsm(self, name: str, core_names: Iterable[str], cores: Mapped) -> Mapped:
+        shell = self._registry.fsm_shell(name)
+        self._loader.require("shell", shell)  # it may be of another package
         states = {state.name: state for state in self._registry.describe_fsm(name)}
         abstract, methods = self._core_of(name)
-        shell = self._registry.fsm_shell(name)
         package, _, class_name = abstract.rpartition("/")
         core = _core_name(class_name, shell)
         if package != self._package and package in self._packages:
