@@ -258,7 +258,7 @@ def _of_file(path: Path, models: Sequence[Path]) -> _Model:
     in_python = {name: is_one for each in found for name, is_one in _modelled(each).items()}
     architecture = build(model, registry, index=index)
     states = previewed_states(model, architecture)
-    kinds = {resource.name: resource.kind for resource in architecture.resources()}
+    kinds = {name: resource.kind for name, resource in model.resources.items()}
     machines = [
         Machine.of(part, states=states[part.name], is_python=_is_python(part, index, in_python), kinds=kinds)
         for part in architecture.components()

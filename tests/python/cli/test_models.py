@@ -98,6 +98,62 @@ def test_a_model_alone_is_proved_schedulable(model: Path, capfd: pytest.CaptureF
     assert (status, told["verdict"]["outcome"]) == (1, "not schedulable")
 
 
+def test_a_latest_value_of_a_type_of_the_model_is_checked(
+    model: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Its struct in C++ is not generated yet."""
+    path = Path(robot(model.parent))
+    whole = path.read_text().replace("target: {kind: shared_data,", "target: {kind: latest_value, max_readers: 1,")
+    path.write_text(whole)
+    assert main(["check", str(path), str(model)]) == 0
+    status, told = verdict(str(path), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
+    assert main(["graph", str(path), str(model)]) == 0
+    assert "latest_value" in capfd.readouterr().out
+
+    path.write_text(whole.replace("[guidance.goal, goal.read]", "[guidance.goal, target.read]"))
+    path.write_text(path.read_text().replace("[guidance.position, position.read]", "[guidance.position, target.read]"))
+    assert main(["check", str(path), str(model)]) == 2
+    assert "too many readers of resource 'target' of kind latest_value" in capfd.readouterr().err
+
+
+RULES = """\
+mauve_rules: 1
+rules:
+  slow_planner:
+    when: {overrun: {component: guidance}}
+    do:
+      - {kind: replace_core, target: guidance, name: my_robot/StraightGuidance}
+"""
+STEPS = """\
+mauve_steps: 1
+steps:
+  - {kind: replace_core, target: guidance, name: my_robot/StraightGuidance}
+  - {kind: set_property, target: guidance, name: target_threshold, value: 0.5}
+"""
+
+
+def test_rules_and_steps_are_tried_with_a_model(model: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    """No code exists."""
+    path = robot(model.parent)
+    rules, steps = model.parent / "rules.yaml", model.parent / "steps.yaml"
+    rules.write_text(RULES, encoding="utf-8")
+    steps.write_text(STEPS, encoding="utf-8")
+    files = [path, str(rules), str(steps), str(model)]
+    assert main(["check", *files]) == 0, capfd.readouterr().err
+    told = capfd.readouterr().out
+    assert f"{steps}: 2 steps, tried on {path}: no error found" in told
+    assert f"{rules}: 1 rule, tried on {path}: no error found" in told
+
+    steps.write_text(STEPS.replace("StraightGuidance", "StraitGuidance"), encoding="utf-8")
+    rules.write_text(RULES.replace("StraightGuidance", "StraitGuidance"), encoding="utf-8")
+    assert main(["check", *files]) == 2
+    told = capfd.readouterr().err
+    assert "did you mean my_robot/StraightGuidance?" in told
+    assert f"{steps}:3:" in told
+    assert f"{rules}:6:" in told
+
+
 ARM = """\
 mauve_model: 1
 package: my_arm
