@@ -244,17 +244,16 @@ def _model(target: str, models: Sequence[Path]) -> _Model:
 
 
 def _of_file(path: Path, models: Sequence[Path]) -> _Model:
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.analysis.machines import Machine  # noqa: PLC0415
-    from mauve_rt.model import PluginIndex, build, load_architecture, previewed_states  # noqa: PLC0415
-    from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
+    from mauve_rt.model import build, load_architecture, previewed_states  # noqa: PLC0415
+    from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
     from mauve_rt.model.threads import thread_list, uses_of  # noqa: PLC0415
     from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     model = load_architecture(path, runs_here=False)
-    registry, loader = PluginRegistry(), ModelLoader(models)
+    loader = ModelLoader(models)
     found = [loader.load(each) for each in models]
-    index = add_modelled_parts(found, registry, PluginIndex.installed())
+    registry, index = modelled_parts(found)
     in_python = {name: is_one for each in found for name, is_one in _modelled(each).items()}
     architecture = build(model, registry, index=index)
     states = previewed_states(model, architecture)

@@ -93,16 +93,14 @@ def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
 
 
 def _check_architecture(path: Path, models: "Sequence[PackageModel]") -> "ArchitectureModel":
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
-    from mauve_rt.model import PluginIndex, build, configure, load_architecture  # noqa: PLC0415
-    from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
+    from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
+    from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
     from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
-    registry = PluginRegistry()
-    index = add_modelled_parts(models, registry, PluginIndex.installed())
+    registry, index = model.parts = modelled_parts(models)
     architecture = build(model, registry, index=index)
     configure(model, architecture)
     architecture.cleanup()

@@ -2,12 +2,10 @@
 
 from collections.abc import Iterator
 
-from mauve_rt._kernel import PluginRegistry
 from mauve_rt.cli.graph_file import require
 from mauve_rt.graph.drawing import Drawing, Edge, Node
 from mauve_rt.graph.fsms import fsm_drawing
-from mauve_rt.model import PluginIndex
-from mauve_rt.model.modelled_parts import add_modelled_parts
+from mauve_rt.model.modelled_parts import modelled_parts
 from mauve_rt.modelling.package_model import PackageModel
 from mauve_rt.modelling.schema import CoreModel, FsmModel, ModelFile, PortModel, ShellModel
 from mauve_rt.modelling.scope import Scope
@@ -40,8 +38,7 @@ def fsm_of_model(model: PackageModel, name: str) -> Drawing:
         ParameterError: there is no such fsm.
     """
     require(name, model.content.fsms, f"{model.path}: fsm")
-    registry = PluginRegistry()
-    add_modelled_parts([*model.closure(), model], registry, PluginIndex())
+    registry = modelled_parts([*model.closure(), model]).registry
     registered = model.registered(name)
     return fsm_drawing(registered, registry.describe_fsm(registered))
 

@@ -6,7 +6,7 @@ drawings and the timing analysis of a model take what the generated code will be
 
 from collections.abc import Iterable, Mapping, Sequence
 from types import ModuleType, SimpleNamespace
-from typing import Any
+from typing import Any, NamedTuple
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.model.plugins import PluginIndex
@@ -20,13 +20,19 @@ from mauve_rt.parts.cores import Core, Shell
 from mauve_rt.parts.message_types import promise
 
 
-def add_modelled_parts(
-    models: Sequence[PackageModel], registry: PluginRegistry, index: PluginIndex
-) -> PluginIndex:
-    """Register the parts of models in the place of installed ones; returns the index of all others.
+class ModelledParts(NamedTuple):
+    """Parts of models in a registry, and the index of those that are installed."""
+
+    registry: PluginRegistry
+    index: PluginIndex
+
+
+def modelled_parts(models: Sequence[PackageModel]) -> ModelledParts:
+    """The parts of models in the place of installed ones.
 
     Parts of models that these use, and that are not among them, are the installed ones.
     """
+    registry, index = PluginRegistry(), PluginIndex.installed()
     given = {model.package for model in models}
     modules: dict[str, object] = {}
     for model in _used_first(models):
@@ -36,7 +42,7 @@ def add_modelled_parts(
             index = index.without(model.package)
         else:
             modules[model.package] = _bases(model)
-    return index
+    return ModelledParts(registry, index)
 
 
 def _used_first(models: Sequence[PackageModel]) -> Iterable[PackageModel]:
