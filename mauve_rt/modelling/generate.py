@@ -8,7 +8,7 @@ from mauve_rt.errors import MauveError
 from mauve_rt.modelling import cpp, python
 from mauve_rt.modelling.checks import abstract_class
 from mauve_rt.modelling.package_model import PackageModel
-from mauve_rt.modelling.schema import CoreModel, CppType
+from mauve_rt.modelling.schema import CoreModel, CppType, ImplementationModel
 from mauve_rt.modelling.source_templates import environment
 from mauve_rt.modelling.type_names import TypeName, parse_type
 
@@ -33,10 +33,17 @@ def skeletons(model: PackageModel, *, is_python: bool = False) -> Files:
     files: Files = {}
     for name, core in model.content.cores.items():
         for each in core.implementations:
-            files |= dict(
-                _python_skeleton(model, name, each) if is_python else _cpp_skeleton(model, name, each)
-            )
+            files |= skeleton(model, name, each, is_python=is_python)
     return files
+
+
+def skeleton(model: PackageModel, core_name: str, name: str, *, is_python: bool = False) -> Files:
+    """The files of one implementation, also of one that the model does not name yet."""
+    core = model.content.cores[core_name]
+    if name not in core.implementations:
+        core = core.changed(implementations={**core.implementations, name: ImplementationModel()})
+    write = _python_skeleton if is_python else _cpp_skeleton
+    return dict(write(model, core, abstract_class(core_name), name))
 
 
 def write_generated(folder: Path, files: Mapping[str, str]) -> None:
@@ -170,12 +177,13 @@ def _registered(model: PackageModel) -> dict[str, Any]:
     }
 
 
-def _cpp_skeleton(model: PackageModel, core_name: str, name: str) -> Iterator[tuple[str, str]]:
-    core: CoreModel = model.content.cores[core_name]
+def _cpp_skeleton(
+    model: PackageModel, core: CoreModel, abstract: str, name: str
+) -> Iterator[tuple[str, str]]:
     if core.implementations[name].include or core.implementations[name].module:
         return  # the class is there
     header = f"{cpp.snake(name)}.hpp"
-    facts = {"name": name, "core": core, "abstract": abstract_class(core_name), "header": header}
+    facts = {"name": name, "core": core, "abstract": abstract, "header": header}
     yield f"src/{header}", _cpp(model, "implementation.hpp", **facts)
     yield f"src/{cpp.snake(name)}.cpp", _cpp(model, "implementation.cpp", **facts)
     yield f"test/test_{cpp.snake(name)}.cpp", _cpp(model, "test.cpp", **facts)
@@ -186,15 +194,16 @@ def _python_files(model: PackageModel) -> Iterator[tuple[str, str]]:
     yield "plugins.txt", python.index(model, _mark(model))
 
 
-def _python_skeleton(model: PackageModel, core_name: str, name: str) -> Iterator[tuple[str, str]]:
-    core = model.content.cores[core_name]
+def _python_skeleton(
+    model: PackageModel, core: CoreModel, abstract: str, name: str
+) -> Iterator[tuple[str, str]]:
     if core.implementations[name].module:
         return
     parts = python.parts_module(model.package)
     facts = {
         "name": name,
         "core": core,
-        "abstract": abstract_class(core_name),
+        "abstract": abstract,
         "parts": parts,
         "module": cpp.snake(name),
         "docstring": python.docstring,

@@ -147,7 +147,7 @@ def test_rules_and_steps_are_tried_with_a_model(model: Path, capfd: pytest.Captu
     rules.write_text(RULES.replace("StraightGuidance", "StraitGuidance"), encoding="utf-8")
     assert main(["check", *files]) == 2
     told = capfd.readouterr().err
-    assert "did you mean my_robot/StraightGuidance?" in told
+    assert "component 'guidance' takes my_robot/PlannedGuidance, my_robot/StraightGuidance" in told
     assert f"{steps}:2:" in told
     assert f"{rules}:6:" in told
 
