@@ -105,22 +105,6 @@ function(_mauve_write_model target)
   set(_mauve_types ${types} PARENT_SCOPE)
 endfunction()
 
-# Where the package mauve_rt is in Python: beside these files in its sources, else in the prefix that they are installed to.
-function(_mauve_python_path result)
-  get_filename_component(sources "${CMAKE_CURRENT_FUNCTION_LIST_DIR}" DIRECTORY)
-  if(EXISTS "${sources}/mauve_rt/modelling/__main__.py")
-    set(found "${sources}")
-  else()
-    get_filename_component(prefix "${sources}" DIRECTORY)
-    get_filename_component(prefix "${prefix}" DIRECTORY)
-    file(GLOB found "${prefix}/lib/python3*/site-packages/mauve_rt" "${prefix}/lib/python3/dist-packages/mauve_rt"
-      "${prefix}/local/lib/python3*/dist-packages/mauve_rt")
-    list(TRANSFORM found REPLACE "/mauve_rt$" "")
-  endif()
-  string(REPLACE ";" ":" found "${found};$ENV{PYTHONPATH}")
-  set(${result} "${found}" PARENT_SCOPE)
-endfunction()
-
 function(_mauve_compile_model target)
   target_sources(${target} PRIVATE "${_mauve_generated}/src/plugins.cpp")
   set(used ${_mauve_used_prefixes})

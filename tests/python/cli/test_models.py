@@ -98,6 +98,24 @@ def test_a_model_alone_is_proved_schedulable(model: Path, capfd: pytest.CaptureF
     assert (status, told["verdict"]["outcome"]) == (1, "not schedulable")
 
 
+def test_the_guards_of_a_wait_have_the_times_of_the_model(
+    model: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """Two guards of 1 us are asked when W1 ends, before Idle."""
+    branch = "next: [{if: has_new_goal, to: Planning}, {if: has_path, to: Following}, Idle]}"
+    text = model.read_text()
+    assert "W1: {wait: 1 * unit_ms, next: Idle}" in text
+    model.write_text(text.replace("W1: {wait: 1 * unit_ms, next: Idle}", f"W1: {{wait: 1 * unit_ms, {branch}"))
+    status, told = verdict(robot(model.parent), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
+    [w1] = [state for state in told["components"][0]["states"] if state["name"] == "W1"]
+    assert (w1["time_ns"], w1["origin"]) == (2_000, "declared by core my_robot/PlannedGuidance")
+
+    model.write_text(model.read_text().replace("follow_path: 0.2 ms, has_new_goal: 1 us,", "follow_path: 0.2 ms,"))
+    status, told = verdict(robot(model.parent), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (3, "not provable")
+
+
 def test_a_latest_value_of_a_type_of_the_model_is_checked(
     model: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
