@@ -253,13 +253,15 @@ def _of_file(path: Path, models: Sequence[Path]) -> _Model:
     model = load_architecture(path, runs_here=False)
     loader = ModelLoader(models)
     found = [loader.load(each) for each in models]
-    registry, index = modelled_parts(found)
+    parts = modelled_parts(found)
     in_python = {name: is_one for each in found for name, is_one in _modelled(each).items()}
-    architecture = build(model, registry, index=index)
+    architecture = build(model, parts.registry, index=parts.index)
     states = previewed_states(model, architecture)
     kinds = {name: resource.kind for name, resource in model.resources.items()}
     machines = [
-        Machine.of(part, states=states[part.name], is_python=_is_python(part, index, in_python), kinds=kinds)
+        Machine.of(
+            part, states=states[part.name], is_python=_is_python(part, parts.index, in_python), kinds=kinds
+        )
         for part in architecture.components()
     ]
     if models:

@@ -100,8 +100,8 @@ def _check_architecture(path: Path, models: "Sequence[PackageModel]") -> "Archit
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
-    registry, index = model.parts = modelled_parts(models)
-    architecture = build(model, registry, index=index)
+    parts = model.parts = modelled_parts(models)
+    architecture = build(model, parts.registry, index=parts.index)
     configure(model, architecture)
     architecture.cleanup()
     if late := late_writers(model):
@@ -115,8 +115,8 @@ def _check_architecture(path: Path, models: "Sequence[PackageModel]") -> "Archit
     found = ", ".join(counted(count, what) for what, count in counts.items())
     print(f"{path}: {found}: no error found")
     for name, resource in model.resources.items():
-        if registry.sequences(resource.type):
-            print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, registry):,} bytes")
+        if parts.registry.sequences(resource.type):
+            print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, parts.registry):,} bytes")
     return model
 
 

@@ -1,4 +1,4 @@
-"""`mauve generate [MODEL [OTHER...]]`: the code of a package's model, and skeletons of the algorithms that it names."""
+"""`mauve generate [MODEL [OTHER...]]`: the code of a package's model, and skeletons of its algorithms."""
 
 import argparse
 import sys

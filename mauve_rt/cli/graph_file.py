@@ -102,8 +102,8 @@ def with_rules(drawing: Drawing, path: Path, topics: Topics) -> Drawing:
 
 
 def _built(model: ArchitectureModel, models: Sequence[PackageModel]) -> Architecture:
-    registry, index = model.parts = modelled_parts(models)
-    return build(model, registry, index=index)
+    parts = model.parts = modelled_parts(models)
+    return build(model, parts.registry, index=parts.index)
 
 
 def _described(model: ArchitectureModel, models: Sequence[PackageModel]) -> Described:

@@ -28,8 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="FILE|NODE|BAG|MODEL",
         help="an architecture file, the node of an executor, a bag, or the model of a package. Rules files "
-        "add their rules; models beside an architecture file give it parts that are not installed. Of several "
-        "models the first one is drawn; the others have parts that it uses",
+        "add their rules; models beside an architecture file give it parts that are not installed. "
+        "Of several models the first one is drawn; the others have parts that it uses",
     )
     completed_by(subjects, complete_executors_and_files)
     component = parser.add_argument(

@@ -5,8 +5,9 @@ drawings and the timing analysis of a model take what the generated code will be
 """
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from types import ModuleType, SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.model.plugins import PluginIndex
@@ -20,7 +21,8 @@ from mauve_rt.parts.cores import Core, Shell
 from mauve_rt.parts.message_types import promise
 
 
-class ModelledParts(NamedTuple):
+@dataclass(frozen=True)
+class ModelledParts:
     """Parts of models in a registry, and the index of those that are installed."""
 
     registry: PluginRegistry

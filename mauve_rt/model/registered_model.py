@@ -177,7 +177,7 @@ class _Reading:
         return {key: value for key, value in head.items() if value is not None} | {"states": shown}
 
     def _core_of(self, fsm: str) -> tuple[str, Mapping[str, list[str]]]:
-        """`package/Class` whose methods an fsm calls, empty: not known; and the methods that it says it has."""
+        """`package/Class` whose methods an fsm calls, empty: not known; and the methods that it has."""
         part = self._loader.python_class("fsm", fsm)
         if part is None:
             classes = self._registry.classes_of("fsm", fsm)

@@ -22,7 +22,7 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
     if can_be_serialized and name not in registry.names("type") and is_message(name):
         return {"resource": DataOfKind(kind, name, **parameters)}
     if kind == _IN_PLACE and name not in registry.names("type") and is_promised(name):
-        # Before the struct is generated: as many services, of the same type. The file was checked for its limits.
+        # Before the struct is generated: the same services. The file was checked for its limits.
         return {"resource": DataOfKind(_STAND_IN, name)}
     return {"kind": kind, "type": name, **parameters}
 

@@ -86,7 +86,7 @@ def messages(model: PackageModel) -> list[str]:
 
 
 def interfaces(model: PackageModel) -> list[str]:
-    """The messages and services of other packages that the model uses, in C++; also by models that it uses."""
+    """The messages and services of other packages that the model needs in C++, by itself or by others."""
     own = [fields for fields in model.content.types.values() if isinstance(fields, Mapping)]
     used = [*_used_types(model), *(of for fields in own for of in fields.values())]
     calls = [port.call for shell in model.content.shells.values() for port in shell.ports.values()]

@@ -1,4 +1,4 @@
-"""Reads models, and finds those of other packages: in files that were given, else where packages are installed."""
+"""Reads models, and finds those of other packages: among given files, else where packages are installed."""
 
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -97,8 +97,12 @@ class ModelLoader:
             else:
                 remedy = "name its model file as well, or write the parts by hand"
             return file.problem(reference.place, what, expected=expected, remedy=remedy)
-        installed = [path.parent.name for prefix in self._prefixes for path in prefix.glob(f"share/*/{MODEL}")]
-        remedy = f"{did_you_mean(package, {*self._given, *installed})}; install it, or name its model file as well"
+        installed = [
+            path.parent.name for prefix in self._prefixes for path in prefix.glob(f"share/*/{MODEL}")
+        ]
+        remedy = (
+            f"{did_you_mean(package, {*self._given, *installed})}; install it, or name its model file as well"
+        )
         what = f"package '{package}' is not found"
         return file.problem(reference.place, what, remedy=remedy, code="unknown_package")
 

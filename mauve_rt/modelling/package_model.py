@@ -56,7 +56,7 @@ class PackageModel:
         return self.scope.cores[fsm.core]
 
     def closure(self) -> list["PackageModel"]:
-        """The models that it uses, directly or through others: each once, behind those that it uses itself."""
+        """The models that it uses, also through others: each once, behind those that it uses itself."""
         found: dict[str, PackageModel] = {}
         for one in self.used.values():
             found |= {each.package: each for each in (*one.closure(), one)}

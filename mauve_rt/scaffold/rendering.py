@@ -21,7 +21,9 @@ def render(kind: str, values: Mapping[str, Any]) -> dict[Path, str]:
     folder = _TEMPLATES / kind
     templates = environment(folder)
     return {
-        Path(templates.from_string(name.removesuffix(".j2")).render(values)): templates.get_template(name).render(values)
+        Path(templates.from_string(name.removesuffix(".j2")).render(values)): templates.get_template(
+            name
+        ).render(values)
         for name in templates.list_templates(extensions=["j2"])
     }
 

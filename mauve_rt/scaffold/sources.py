@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, ParameterError
-from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.file_schema.words import did_you_mean
+from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.file_kinds import FileKind, file_kind
 from mauve_rt.modelling.checks import abstract_class
 from mauve_rt.modelling.loading import MODEL, load_model

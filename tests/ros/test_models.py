@@ -215,14 +215,15 @@ def load_model_of(text: str, prefix: Path) -> ModelFile:
     return ModelLoader(prefixes=[prefix]).load("model.yaml", text=text).content
 
 
+REACH = "types:\n  Reach: {at: my_robot/Point2D, home: geometry_msgs/msg/Point}\n"
+
+
 def in_python(text: str) -> str:
     """A model whose types are installed messages: those of a package in Python need a build in C."""
     text = text.replace(
         'types:\n  Point2D: {x: float64, y: float64}\n  Path: {points: "Point2D[<=64]"}\n', ""
     )
-    text = text.replace("types:\n  Reach: {at: my_robot/Point2D, home: geometry_msgs/msg/Point}\n", "").replace(
-        "Reach", "geometry_msgs/msg/Point"
-    )
+    text = text.replace(REACH, "").replace("Reach", "geometry_msgs/msg/Point")
     text = text.replace("my_robot/Point2D", "Point2D").replace("Point2D", "geometry_msgs/msg/Point")
     return text.replace("current_goal: geometry_msgs/msg/Point, path: Path, ", "")
 

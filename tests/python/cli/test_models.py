@@ -105,13 +105,17 @@ def test_the_guards_of_a_wait_have_the_times_of_the_model(
     branch = "next: [{if: has_new_goal, to: Planning}, {if: has_path, to: Following}, Idle]}"
     text = model.read_text()
     assert "W1: {wait: 1 * unit_ms, next: Idle}" in text
-    model.write_text(text.replace("W1: {wait: 1 * unit_ms, next: Idle}", f"W1: {{wait: 1 * unit_ms, {branch}"))
+    model.write_text(
+        text.replace("W1: {wait: 1 * unit_ms, next: Idle}", f"W1: {{wait: 1 * unit_ms, {branch}")
+    )
     status, told = verdict(robot(model.parent), model, capfd)
     assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
     [w1] = [state for state in told["components"][0]["states"] if state["name"] == "W1"]
     assert (w1["time_ns"], w1["origin"]) == (2_000, "declared by core my_robot/PlannedGuidance")
 
-    model.write_text(model.read_text().replace("follow_path: 0.2 ms, has_new_goal: 1 us,", "follow_path: 0.2 ms,"))
+    model.write_text(
+        model.read_text().replace("follow_path: 0.2 ms, has_new_goal: 1 us,", "follow_path: 0.2 ms,")
+    )
     status, told = verdict(robot(model.parent), model, capfd)
     assert (status, told["verdict"]["outcome"]) == (3, "not provable")
 
@@ -121,7 +125,9 @@ def test_a_latest_value_of_a_type_of_the_model_is_checked(
 ) -> None:
     """Its struct in C++ is not generated yet."""
     path = Path(robot(model.parent))
-    whole = path.read_text().replace("target: {kind: shared_data,", "target: {kind: latest_value, max_readers: 1,")
+    whole = path.read_text().replace(
+        "target: {kind: shared_data,", "target: {kind: latest_value, max_readers: 1,"
+    )
     path.write_text(whole)
     assert main(["check", str(path), str(model)]) == 0
     capfd.readouterr()
@@ -129,7 +135,9 @@ def test_a_latest_value_of_a_type_of_the_model_is_checked(
     assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
 
     path.write_text(whole.replace("[guidance.goal, goal.read]", "[guidance.goal, target.read]"))
-    path.write_text(path.read_text().replace("[guidance.position, position.read]", "[guidance.position, target.read]"))
+    path.write_text(
+        path.read_text().replace("[guidance.position, position.read]", "[guidance.position, target.read]")
+    )
     assert main(["check", str(path), str(model)]) == 2
     assert "too many readers of resource 'target' of kind latest_value" in capfd.readouterr().err
 
@@ -202,9 +210,7 @@ def arm_robot(folder: Path) -> Path:
     return path
 
 
-def test_a_model_uses_parts_of_another_one(
-    model: Path, arm: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_model_uses_parts_of_another_one(model: Path, arm: Path, capfd: pytest.CaptureFixture[str]) -> None:
     path = arm_robot(model.parent)
     assert main(["check", str(arm)]) == 2
     assert f"{arm}:5:12: package 'my_robot' is not found" in capfd.readouterr().err

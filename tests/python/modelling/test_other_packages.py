@@ -105,9 +105,7 @@ def test_a_model_uses_parts_through_another_model(tmp_path: Path) -> None:
     assert model.core_of(model.content.fsms["EagerFsm"]).shell == "my_robot/GuidanceShell"
 
 
-def test_the_model_of_an_installed_package_is_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_model_of_an_installed_package_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     installed(monkeypatch, tmp_path / "prefix", "my_robot", GUIDANCE.read_text(encoding="utf-8"))
     assert load(tmp_path, ARM).used["my_robot"].path == tmp_path / "prefix/share/my_robot/model.yaml"
 
@@ -138,9 +136,21 @@ def test_a_package_without_a_model_is_refused(tmp_path: Path, monkeypatch: pytes
             "shell: my_robot/GuidanceShel",
             "15:12: package 'my_robot' has no shell 'GuidanceShel' in its model; did you mean GuidanceShell?",
         ),
-        ("core: my_robot/Guidance\n", "core: my_robot/Guidence\n", "has no core 'Guidence' in its model; did"),
-        ("write: my_robot/Point2D", "write: my_robot/Pont2D", "7:49: package 'my_robot' has no type 'Pont2D'"),
-        ("run: compute_path", "run: compute", "core 'my_robot/Guidance' has no action 'compute'; did you mean"),
+        (
+            "core: my_robot/Guidance\n",
+            "core: my_robot/Guidence\n",
+            "has no core 'Guidence' in its model; did",
+        ),
+        (
+            "write: my_robot/Point2D",
+            "write: my_robot/Pont2D",
+            "7:49: package 'my_robot' has no type 'Pont2D'",
+        ),
+        (
+            "run: compute_path",
+            "run: compute",
+            "core 'my_robot/Guidance' has no action 'compute'; did you mean",
+        ),
         ("wait: 5 * unit_ms", "wait: 5 * unit", "there is no property 'unit'; did you mean unit_ms?"),
         ("read: Reach", "read: my_arm/Reach", "package 'my_arm' is the one of this model; write Reach"),
     ],
@@ -154,7 +164,9 @@ def test_what_the_other_model_lacks_is_refused_at_its_place(
 
 
 def test_models_that_use_each_other_are_refused(tmp_path: Path) -> None:
-    robot = GUIDANCE.read_text(encoding="utf-8").replace("goal: {read: Point2D}", "goal: {read: my_arm/Reach}")
+    robot = GUIDANCE.read_text(encoding="utf-8").replace(
+        "goal: {read: Point2D}", "goal: {read: my_arm/Reach}"
+    )
     told = refused(tmp_path, ARM, robot)
     assert "other_0.yaml:14:20: models use each other: my_arm -> my_robot -> my_arm; move the parts" in told
 
@@ -164,4 +176,6 @@ def test_a_message_has_no_field_that_exists_in_cpp_only(tmp_path: Path) -> None:
         "types:\n", "types:\n  Pose: {cpp: 'a::Pose', include: a/pose.hpp, name: geometry_msgs/msg/Pose}\n"
     )
     told = refused(tmp_path, text.replace('"my_robot/Point2D[<=4]"', "Pose"), GUIDANCE)
-    assert "a message has no field of 'Pose', a struct that exists in C++; write geometry_msgs/msg/Pose" in told
+    assert (
+        "a message has no field of 'Pose', a struct that exists in C++; write geometry_msgs/msg/Pose" in told
+    )

@@ -169,7 +169,9 @@ def modelled(here: Path) -> Path:
     return folder
 
 
-@pytest.mark.parametrize("base", ["Guidance", "my_robot/PlannedGuidance", "GuidanceShell", "GuidanceCore", ""])
+@pytest.mark.parametrize(
+    "base", ["Guidance", "my_robot/PlannedGuidance", "GuidanceShell", "GuidanceCore", ""]
+)
 def test_a_core_of_a_model_has_its_actions_and_guards(
     base: str, modelled: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -193,7 +195,9 @@ def test_a_core_of_a_model_in_python_is_one(modelled: Path) -> None:
 def test_a_core_that_the_model_lacks_is_refused(modelled: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = files(modelled)
     assert main(["new", "core", "Careful", "--for", "Guidence", "--in", str(modelled)]) == 2
-    assert "model.yaml has no such core, shell or algorithm; did you mean Guidance?" in capsys.readouterr().err
+    assert (
+        "model.yaml has no such core, shell or algorithm; did you mean Guidance?" in capsys.readouterr().err
+    )
     assert files(modelled) == before
 
 
