@@ -59,8 +59,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                 dest="base",
                 default="",
                 metavar="SHELL|CORE",
-                help="shell, or another core, that it is for; also a core of the package's model, whose actions "
-                "and guards it has (default: the only one of the package)",
+                help="shell, or another core, that it is for; also a core of the package's model, whose "
+                "actions and guards it has (default: the only one of the package)",
             )
 
 
