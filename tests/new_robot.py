@@ -45,6 +45,20 @@ class NewRobot:
         assert "warning: " not in said, said
         return said
 
+    def warnings(self) -> str:
+        """What `mauve check` has to say of its files, once it is built."""
+        setup = f"install/share/{self._name}/local_setup.bash"
+        done = subprocess.run(
+            ["bash", "-c", f"source {setup} && '{self._mauve}' check architecture/*.yaml"],
+            env=self._environment,
+            cwd=self.folder,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stderr
+
     @contextmanager
     def running(self, *words: str) -> Iterator[None]:
         """While `mauve run` does. Ctrl-C ends it."""

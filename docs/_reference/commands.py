@@ -3,9 +3,10 @@
 import argparse
 from collections.abc import Iterator
 
-from _reference.tables import sentence, table
+from _reference.tables import table
 from mauve_rt.cli.main import build_parser
 from mauve_rt.cli.verb import EXIT_STATUSES
+from mauve_rt.file_schema.setting_words import sentence
 
 
 def text() -> str:

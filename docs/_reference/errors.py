@@ -6,7 +6,8 @@ from typing import NamedTuple
 from _reference import ROOT
 from _reference.messages import parsed
 from _reference.python_source import doc_of, tree_of
-from _reference.tables import sentence, table
+from _reference.tables import table
+from mauve_rt.file_schema.setting_words import sentence
 
 _HEADER = ROOT / "mauve_rt/kernel/include/mauve_rt/base/error.hpp"
 _REPLIES = ROOT / "mauve_msgs/msg/ReplyCode.msg"

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from _reference.tables import limits, sentence, shown, table, unit_of
+from _reference.tables import shown, table
+from mauve_rt.file_schema.setting_words import limits, sentence, unit_of
 from mauve_rt.node.executor import settings as executor
 from mauve_rt.node.shared.settings import OF_RCLPY, Setting, type_name
 from mauve_rt.node.supervisor import settings as supervisor

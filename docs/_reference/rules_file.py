@@ -1,7 +1,8 @@
 """The keys of rules files, steps files and scripts, with the kinds of conditions and steps."""
 
-from _reference.tables import limits, section_table, sentence, shown, table
+from _reference.tables import section_table, shown, table
 from mauve_rt.file_schema.section import Section
+from mauve_rt.file_schema.setting_words import limits, sentence
 from mauve_rt.model import steps as steps_of_files
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.supervision.condition_table import choices, conditions

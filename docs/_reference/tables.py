@@ -1,15 +1,13 @@
 """Tables of settings in Markdown: type, unit, range and default of a key in words."""
 
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from mauve_rt.file_schema import kinds
 from mauve_rt.file_schema.section import Part, Section, Setting
+from mauve_rt.file_schema.setting_words import range_of, sentence, unit_of
 
-_UNITS = {"ns": "ns", "us": "µs", "ms": "ms", "s": "s", "bytes": "bytes", "records": "records"}
-_HUGE = 1e12  # a bound that only keeps numbers within 64 bits
 _WORDS = {  # of kinds without bounds; a new kind needs a line
     "Flag": "boolean",
     "Scalar": "boolean, number or text",
@@ -52,11 +50,6 @@ def setting_row(
     return [f"`{key}`", kind, unit or unit_of(key), bounds, default, sentence(setting.what)]
 
 
-def unit_of(key: str) -> str:
-    """The unit that the end of a name says: `period_ns` is in ns."""
-    return _UNITS.get(key.rpartition("_")[2], "") if "_" in key else ""
-
-
 def words(kind: kinds.Kind, links: Mapping[type[Section], str]) -> tuple[str, str]:
     """The type and the range of a value."""
     match kind:
@@ -81,10 +74,9 @@ def _several(kind: str) -> str:
 def _plain_words(kind: kinds.Kind) -> tuple[str, str]:
     match kind:
         case kinds.Whole():
-            return "integer", limits(kind.least, kind.most)
+            return "integer", range_of(kind)
         case kinds.Real():
-            bounds = limits(kind.least, kind.most)
-            return "number", f"more than {kind.above:g}" if kind.above > -math.inf else bounds
+            return "number", range_of(kind)
         case kinds.Choice():
             return "word" if isinstance(kind.values[0], str) else "integer", ", ".join(
                 f"`{value}`" for value in kind.values
@@ -103,21 +95,6 @@ def _count(kind: kinds.ListOf) -> str:
     return f"{kind.few} to {kind.many} elements"
 
 
-def limits(low: float | None, high: float | None) -> str:
-    """A range in words."""
-    has_low = low is not None and abs(low) < _HUGE
-    has_high = high is not None and abs(high) < _HUGE
-    if has_low and has_high:
-        return f"{_number(low)} to {_number(high)}"
-    if has_low:
-        return f"{_number(low)} or more"
-    return f"{_number(high)} or less" if has_high else ""
-
-
-def _number(value: Any) -> str:
-    return f"{value:,}" if isinstance(value, int) else f"{value:g}"
-
-
 def shown(value: Any) -> str:
     """A default as a file has it."""
     if value is None or value == "":
@@ -127,8 +104,3 @@ def shown(value: Any) -> str:
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
     return f"`{value}`"
-
-
-def sentence(text: str) -> str:
-    """With a capital letter and a full stop."""
-    return text[0].upper() + text[1:] + ("" if text.endswith(".") else ".")

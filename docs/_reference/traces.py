@@ -6,7 +6,8 @@ import re
 from _reference import ROOT
 from _reference.messages import parsed
 from _reference.python_source import find, tree_of
-from _reference.tables import sentence, table
+from _reference.tables import table
+from mauve_rt.file_schema.setting_words import sentence
 
 _FIELD = re.compile(r"\b(name|a|b|c): ((?:\w+)(?: \([^)]*\))?)")
 _MESSAGES = ROOT / "mauve_msgs" / "msg"

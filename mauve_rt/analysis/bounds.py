@@ -79,14 +79,17 @@ def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, B
     """
     times: dict[str, DigraphTimes] = {}
     for here in by_cpu(subjects):
-        found = digraph_times([_component(subject) for subject in here], jitter_ns=wakeup_ns)
+        found = digraph_times([component_of(subject) for subject in here], jitter_ns=wakeup_ns)
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
     return {
-        subject.name: _bound(subject, subjects, times) for subject in subjects if subject.machine.is_component
+        subject.name: bound_of(subject, subjects, times)
+        for subject in subjects
+        if subject.machine.is_component
     }
 
 
-def _component(subject: Subject) -> Component:
+def component_of(subject: Subject) -> Component:
+    """As the analysis of response times takes it."""
     machine = subject.machine
     states = tuple((state.name, state.time.ns or 0) for state in machine.states if not state.is_wait)
     return Component(subject.task, machine.priority, subject.sections, bool(machine.clients), states)
@@ -96,10 +99,11 @@ def by_cpu(subjects: Sequence[Subject]) -> list[list[Subject]]:
     """Those without obstacles: components of each CPU, and threads that may run there."""
     known = [subject for subject in subjects if not subject.obstacles]
     cpus = sorted({subject.machine.cpus for subject in known if subject.machine.is_component})
-    return [[subject for subject in known if _runs_on(subject.machine, each)] for each in cpus]
+    return [[subject for subject in known if runs_on(subject.machine, each)] for each in cpus]
 
 
-def _runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
+def runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
+    """Whether a component runs on these CPUs, or another thread may."""
     if machine.is_component:
         return machine.cpus == cpus
     return not machine.cpus or bool({*machine.cpus} & {*cpus})
@@ -110,7 +114,8 @@ def delaying(subject: Subject, subjects: Sequence[Subject]) -> list[Subject]:
     return [other for other in subjects if other.obstacles and _may_delay(other, subject, among=subjects)]
 
 
-def _bound(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]) -> Bound:
+def bound_of(subject: Subject, subjects: Sequence[Subject], times: Mapping[str, DigraphTimes]) -> Bound:
+    """Of a component, by the times of its CPU."""
     deadline_ns = min((job.deadline_ns for job in subject.task.jobs), default=0)
     if subject.obstacles:
         return Bound(None, deadline_ns, "it is not provable")

@@ -1,20 +1,25 @@
 """A task model and a verdict to look at."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 from mauve_rt.analysis.bounds import Bound, Subject
 from mauve_rt.analysis.digraph import Job
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, State, in_ms
-from mauve_rt.analysis.verdict import Outcome, Verdict, missing_of
+from mauve_rt.analysis.study import Study
+from mauve_rt.analysis.verdict import Outcome, missing_of
 from mauve_rt.model.threads import ThreadList
 
+if TYPE_CHECKING:
+    from mauve_rt.cli.analyze_plan import Alternative, Plan
 
-def print_model(subjects: Sequence[Subject], bounds: Mapping[str, Bound], threads: ThreadList) -> None:
+
+def print_model(now: Study, threads: ThreadList) -> None:
     """Print each component: its states, its jobs, its bound; then what else takes a CPU or a lock."""
-    for subject in subjects:
+    for subject in now.subjects:
         if subject.machine.is_component:
-            _print_component(subject, bounds[subject.name])
-    for subject in subjects:
+            _print_component(subject, now.bounds[subject.name])
+    for subject in now.subjects:
         if not subject.machine.is_component:
             print(_thread(subject))
     costs = [f"begins up to {in_ms(threads.wakeup_ns)} late"] if threads.wakeup_ns >= 0 else []
@@ -52,25 +57,51 @@ def _thread(subject: Subject) -> str:
     if not machine.priority:
         held = ", ".join([*map(str, machine.holds), *machine.undeclared_locks])
         return f"thread '{machine.name}': holds the lock of {held}"
-    (wait, work) = machine.states
-    often = f" every {in_ms(wait.separation_ns)}" if wait.separation_ns != FOREVER_NS else ""
-    return f"thread '{machine.name}': {where}, priority {machine.priority}, {work.time}{often}"
+    cost_ns, often_ns = subject.task.largest_cost_ns, subject.task.shortest_separation_ns
+    cost = "of unknown cost" if cost_ns is None else f"at most {in_ms(cost_ns)}"
+    often = f" every {in_ms(often_ns)}" if often_ns != FOREVER_NS else ""
+    return f"thread '{machine.name}': {where}, priority {machine.priority}, {cost}{often}"
 
 
-def print_verdict(
-    verdict: Verdict, subjects: Sequence[Subject], assumptions: Sequence[str], unknown: Sequence[str]
-) -> None:
+def print_verdict(now: Study, assumptions: Sequence[str]) -> None:
     """Print it, with its conditions, or with what is missing."""
+    verdict = now.verdict
     if verdict.outcome in (Outcome.SCHEDULABLE, Outcome.FORECAST):
         joined = "if" if verdict.outcome == Outcome.SCHEDULABLE else "and"
         _print_list(f"{verdict.sentence}, {joined}", assumptions)
     elif verdict.outcome == Outcome.NOT_SCHEDULABLE:
         _print_list(f"{verdict.sentence}, if", _REACHED)
     elif verdict.outcome == Outcome.NOT_PROVABLE:
-        found = [f"{subject.name}: {why}" for subject in missing_of(subjects) for why in subject.obstacles]
-        _print_list(f"{verdict.sentence}", [*found, *(f"this computer: {why}" for why in unknown)])
+        _print_list(verdict.sentence, [*_missing(now)])
     else:
         print(verdict.sentence)
+
+
+def print_plan(plan: "Plan") -> None:
+    """Print the verdicts on a change."""
+    for when, found in (("during the change", plan.during), ("after it", plan.after)):
+        missing = [*_missing(found)] if found.verdict.outcome == Outcome.NOT_PROVABLE else []
+        _print_list(f"{when}: {found.verdict.sentence}", missing)
+
+
+def print_alternative(alternative: "Alternative") -> None:
+    """Print whether the architecture is schedulable with that core, and while it comes in."""
+    kind = "fallback" if alternative.is_fallback else "alternative"
+    head = f"with {kind} {alternative.core} of {alternative.component}"
+    plan = alternative.plan
+    is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
+    worse = plan.during if is_sound else plan.after
+    when = "while it comes in: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
+    missing = [*_missing(worse)] if worse.verdict.outcome == Outcome.NOT_PROVABLE else []
+    _print_list(f"{head}: {when}{worse.verdict.sentence}", missing)
+
+
+def _missing(study: Study) -> Iterator[str]:
+    for subject in missing_of(study.subjects):
+        for why in subject.obstacles:
+            yield f"{subject.name}: {why}"
+    for why in study.unknown:
+        yield f"this computer: {why}"
 
 
 _REACHED = (

@@ -36,11 +36,16 @@ def main(args: argparse.Namespace) -> int:
     """Run the tools; returns the exit status of the first one that fails."""
     from mauve_rt.scaffold.environment import to_build  # noqa: PLC0415
     from mauve_rt.scaffold.package import find_package  # noqa: PLC0415
+    from mauve_rt.scaffold.schemas import write_schemas  # noqa: PLC0415
 
     package = find_package(args.package)
     build_type = "Debug" if args.debug else "Release"
     commands = _cmake if package.workspace is None else _colcon
     environment = to_build()
+    try:
+        write_schemas(package.folder)
+    except OSError as error:  # the sources may be read-only
+        print(f"mauve: no schemas for editors: {error}", file=sys.stderr)
     for command in commands(package, build_type, test=args.test):
         words = [str(word) for word in command]
         print(f"mauve: {shlex.join(words)}", file=sys.stderr, flush=True)

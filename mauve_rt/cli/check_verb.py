@@ -14,10 +14,12 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
-    from collections.abc import Iterable, Sequence
+    from collections.abc import Iterable, Mapping, Sequence
 
     from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
+    from mauve_rt.model.file_kinds import FileKind
+    from mauve_rt.model.remarks import Subject, Uses
     from mauve_rt.modelling.loading import ModelLoader
     from mauve_rt.modelling.package_model import PackageModel
 
@@ -48,23 +50,38 @@ def main(args: argparse.Namespace) -> int:
     if len(architectures) > 1 and len(kinds) > len(architectures):
         print("mauve: check steps and rules with one architecture file, not with several", file=sys.stderr)
         return BAD_USAGE
+    order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
+    return _check_all(
+        {path: kinds[path] for path in sorted(kinds, key=lambda path: order.index(kinds[path]))}
+    )
+
+
+def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
+    """Check files in this order. The warnings of an architecture come when all files are read."""
+    from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
+    from mauve_rt.model.remarks import Uses, remarks  # noqa: PLC0415
     from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
-    status, model = OK, None
+    status, model, uses = OK, None, Uses()
     printed: set[str] = set()  # a model that others use is wrong once
-    models: list[PackageModel] = []
     loader = ModelLoader(path for path, kind in kinds.items() if kind is FileKind.MODEL)
-    order = [FileKind.MODEL, FileKind.ARCHITECTURE, FileKind.STEPS, FileKind.RULES]
-    for path in sorted(kinds, key=lambda path: order.index(kinds[path])):
+    models: list[PackageModel] = []
+    subjects: list[Subject] = []
+    for path, kind in kinds.items():
         try:
-            if kinds[path] is FileKind.MODEL:
+            if kind is FileKind.MODEL:
                 models.append(_check_model(path, loader))
-            elif kinds[path] is FileKind.ARCHITECTURE:
-                model = _check_architecture(path, models)
+            elif kind is FileKind.ARCHITECTURE:
+                subjects.append(_check_architecture(path, models, uses))
+                model = subjects[-1].model
+            elif kind is FileKind.RULES:
+                _check_rules(path, model, uses)
             else:
-                (_check_rules if kinds[path] is FileKind.RULES else _check_steps)(path, model)
+                _check_steps(path, model, uses)
         except ArchitectureFileError as error:
             status = _tell(error, printed)
+    for subject in subjects if status == OK else ():
+        _warn(subject.model.path, remarks(subject))
     return status
 
 
@@ -92,21 +109,21 @@ def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
 
 
-def _check_architecture(path: Path, models: "Sequence[PackageModel]") -> "ArchitectureModel":
+def _check_architecture(path: Path, models: "Sequence[PackageModel]", uses: "Uses") -> "Subject":
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
     from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
     from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
-    from mauve_rt.model.qos_remarks import file_warnings  # noqa: PLC0415
+    from mauve_rt.model.remarks import Subject  # noqa: PLC0415
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
     parts = model.parts = modelled_parts(models)
     architecture = build(model, parts.registry, index=parts.index)
     configure(model, architecture)
+    subject = Subject(model, architecture, uses)
     architecture.cleanup()
     if late := late_writers(model):
         raise ArchitectureFileError(path, late)
-    _warn(path, file_warnings(model))
     counts = {
         "component": len(model.components),
         "resource": len(model.resources),
@@ -117,30 +134,35 @@ def _check_architecture(path: Path, models: "Sequence[PackageModel]") -> "Archit
     for name, resource in model.resources.items():
         if parts.registry.sequences(resource.type):
             print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, parts.registry):,} bytes")
-    return model
+    return subject
 
 
-def _check_steps(path: Path, model: "ArchitectureModel | None") -> None:
+def _check_steps(path: Path, model: "ArchitectureModel | None", uses: "Uses") -> None:
     from mauve_rt.model.steps import load_change  # noqa: PLC0415
     from mauve_rt.supervision.rehearsal import try_change  # noqa: PLC0415
 
     change = load_change(path)
+    uses.steps += change.steps
     if model is not None:
         try_change(path, change, model)
     print(f"{path}: {counted(len(change.steps), 'step')}{_tried_on(model)}: no error found")
 
 
-def _check_rules(path: Path, model: "ArchitectureModel | None") -> None:
+def _check_rules(path: Path, model: "ArchitectureModel | None", uses: "Uses") -> None:
     from mauve_rt.supervision.drivers import unbounded_outputs  # noqa: PLC0415
     from mauve_rt.supervision.rule_findings import all_findings  # noqa: PLC0415
     from mauve_rt.supervision.rules import RulesFile  # noqa: PLC0415
+    from mauve_rt.supervision.uses import add_uses, unpublished_topics  # noqa: PLC0415
 
     file = RulesFile(path)
+    add_uses(uses, file)
     found = all_findings(file, model)
     if model is not None:
         found += unbounded_outputs(file, model)
     if found:
         raise ArchitectureFileError(path, found)
+    if model is not None:
+        _warn(path, unpublished_topics(file, model, uses))
     print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")
 
 

@@ -79,6 +79,7 @@ def _write_package(args: argparse.Namespace) -> Iterator[Path]:
     from mauve_rt.parts.ament_index import share_folder  # noqa: PLC0415 - other verbs need not load these
     from mauve_rt.scaffold.names import check_package, part_names  # noqa: PLC0415
     from mauve_rt.scaffold.rendering import render, write_package  # noqa: PLC0415
+    from mauve_rt.scaffold.schemas import write_schemas  # noqa: PLC0415
     from mauve_rt.scaffold.sources import Port, cpp_base, python_base  # noqa: PLC0415
 
     check_package(args.name)
@@ -97,6 +98,7 @@ def _write_package(args: argparse.Namespace) -> Iterator[Path]:
     files |= render(f"component_{language}", values | {"name": begin, "file": begin_file})
     files |= render(f"core_{language}", values | {"name": other, "file": other_file})
     write_package(Path(args.name), files)
+    write_schemas(Path(args.name))
     yield from (args.name / path for path in sorted(files))
     print(f"next: cd {shlex.quote(args.name)} && mauve build --test && mauve run", file=sys.stderr)
 
@@ -105,12 +107,14 @@ def _write_part(args: argparse.Namespace) -> Iterator[Path]:
     from mauve_rt.scaffold.names import part_names  # noqa: PLC0415
     from mauve_rt.scaffold.package import find_package  # noqa: PLC0415
     from mauve_rt.scaffold.rendering import render, write_parts  # noqa: PLC0415
+    from mauve_rt.scaffold.schemas import write_schemas  # noqa: PLC0415
     from mauve_rt.scaffold.sources import base_of, modelled_core, target_of  # noqa: PLC0415
 
     name, file = part_names(args.name)
     package = find_package(args.folder)
     if args.kind == "core" and (found := modelled_core(package.folder, args.base)) is not None:
         yield from _write_modelled_core(package.folder, *found, name, in_python=args.python)
+        write_schemas(package.folder)
         return
     values: dict[str, Any] = {"package": package.name, "name": name, "file": file}
     if args.kind == "core":
@@ -121,6 +125,7 @@ def _write_part(args: argparse.Namespace) -> Iterator[Path]:
     if _PARTS[args.kind].has_language:
         template += "_python" if args.python else "_cpp"
     yield from (package.folder / path for path in write_parts(package.folder, render(template, values)))
+    write_schemas(package.folder)
 
 
 def _write_modelled_core(

@@ -22,6 +22,7 @@ from mauve_rt.cli import (
     report_verb,
     rules_verb,
     run_verb,
+    schema_verb,
     shadow_verb,
     trace_verb,
     types_verb,
@@ -563,5 +564,11 @@ VERBS = (
         "print the model of the parts that an installed package registers",
         model_verb.add_arguments,
         model_verb.main,
+    ),
+    Verb(
+        "schema",
+        "print the JSON Schema of a kind of file, by which editors complete and check the file",
+        schema_verb.add_arguments,
+        schema_verb.main,
     ),
 )

@@ -11,6 +11,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import Any
 
+from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, text_form
 from mauve_rt.file_schema.words import listed
 from mauve_rt.file_schema.yaml_file import Location
 
@@ -43,6 +44,10 @@ class Kind(ABC):
     def read(self, value: Any, place: Location, faults: Faults) -> Any:
         """The value as the program takes it; what is wrong is added to `faults`."""
 
+    @abstractmethod
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """The values that read() takes, as JSON Schema; parts with names go to `definitions`."""
+
 
 class Flag(Kind):
     """True or false."""
@@ -52,6 +57,10 @@ class Flag(Kind):
         if not isinstance(value, bool):
             faults.append(Fault(place, "flag", found=value))
         return value
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": "boolean"}
 
 
 class Whole(Kind):
@@ -69,6 +78,10 @@ class Whole(Kind):
         elif value > self.most:
             faults.append(Fault(place, "most", limit=self.most, found=value))
         return value
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": "integer", "minimum": self.least, "maximum": self.most}
 
 
 _LARGEST = sys.float_info.max
@@ -96,6 +109,12 @@ class Real(Kind):
             return float(value)
         return value
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        is_open = self.above > -math.inf
+        low = {"exclusiveMinimum": self.above} if is_open else {"minimum": max(self.least, -_LARGEST)}
+        return {"type": "number", **low, "maximum": min(self.most, _LARGEST)}
+
 
 class Text(Kind):
     """Text, of a form where `pattern` says one; `expected` is the form in words. `made` makes it uniform."""
@@ -121,6 +140,14 @@ class Text(Kind):
             return False
         return not self.pattern or re.fullmatch(self.pattern, value, re.ASCII) is not None
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": "string", **self.json_form()}
+
+    def json_form(self) -> JsonSchema:
+        """The form of the text alone, as JSON Schema."""
+        return text_form(self.pattern, without=self.without, expected=self.expected) if self.pattern else {}
+
 
 class Choice(Kind):
     """One of a few words or numbers."""
@@ -135,6 +162,10 @@ class Choice(Kind):
             faults.append(Fault(place, "choice", limit=listed(words), found=value, known=words))
         return value
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"enum": [*self.values]}
+
 
 class Scalar(Kind):
     """True, false, a number or text."""
@@ -144,6 +175,10 @@ class Scalar(Kind):
         if not isinstance(value, bool | int | float | str):
             faults.append(Fault(place, "form", limit="true, false, a number or text", found=value))
         return value
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": ["boolean", "number", "string"]}
 
 
 class ListOf(Kind):
@@ -163,6 +198,12 @@ class ListOf(Kind):
             faults.append(Fault(place, "many", limit=self.many, found=value))
         return [self.kind.read(each, (*place, index), faults) for index, each in enumerate(value)]
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        most = {} if self.many is None else {"maxItems": self.many}
+        least = {"minItems": self.few} if self.few else {}
+        return {"type": "array", "items": self.kind.json_schema(definitions), **least, **most}
+
 
 class TableOf(Kind):
     """A mapping of names that are no keys of ours, with at least `few` of them."""
@@ -181,3 +222,14 @@ class TableOf(Kind):
             if not self.names.fits(name):
                 faults.append(Fault((*place, name), "name", limit=self.names.expected, found=name))
         return {name: self.kind.read(each, (*place, name), faults) for name, each in value.items()}
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        least = {"minProperties": self.few} if self.few else {}
+        names = {"propertyNames": form} if (form := self.names.json_form()) else {}
+        return {
+            "type": "object",
+            "additionalProperties": self.kind.json_schema(definitions),
+            **names,
+            **least,
+        }

@@ -12,7 +12,17 @@ Objects are immutable and compare by value. A setting whose default is None take
 from collections.abc import Mapping
 from typing import Any, ClassVar, Self, dataclass_transform
 
+from mauve_rt.file_schema.json_schema import (
+    Definitions,
+    JsonSchema,
+    defined,
+    document,
+    first_sentence,
+    mapping,
+    or_null,
+)
 from mauve_rt.file_schema.kinds import Fault, Faults, Kind
+from mauve_rt.file_schema.setting_words import described, unit_of
 from mauve_rt.file_schema.yaml_file import Location
 
 _REQUIRED = object()
@@ -45,6 +55,15 @@ class Setting:
             if len(fault.place) <= len(place) + 1:  # of the value or of an element of it
                 fault.hint = fault.hint or self.hint
         return read
+
+    def json_schema(self, definitions: Definitions, *, unit: str) -> JsonSchema:
+        """The values that read() takes, as JSON Schema, and in words what the key is for."""
+        schema = self.kind.json_schema(definitions)
+        if self.default is None:
+            schema = or_null(schema)
+        elif not self.is_required and self.default != "":
+            schema = {**schema, "default": _plain(self.default)}
+        return {**schema, "description": described(self.what, self.kind, unit, schema.get("default"))}
 
 
 def setting(kind: Kind, what: str, *, default: Any = _REQUIRED, hint: str = "", key: str = "") -> Any:
@@ -91,6 +110,31 @@ class Section:
     def misfit(self) -> Fault | None:
         """What is wrong where settings, each good by itself, do not fit each other; mostly nothing."""
         return None
+
+    @classmethod
+    def json_schema(cls, definitions: Definitions) -> JsonSchema:
+        """A reference to its definition, which is added to `definitions`."""
+        return defined(cls.__name__.lstrip("_"), definitions, cls.json_definition)
+
+    @classmethod
+    def json_document(cls, name: str) -> JsonSchema:
+        """The JSON Schema of a file that has this section at its top."""
+        definitions: Definitions = {}
+        return document(cls.json_definition(definitions), definitions, name=name)
+
+    @classmethod
+    def json_definition(cls, definitions: Definitions) -> JsonSchema:
+        """The mappings that read() takes, as JSON Schema."""
+        known = cls.settings
+        keys = {key: each.json_schema(definitions, unit=unit_of(key)) for key, each in known.items()}
+        required = [key for key, each in known.items() if each.is_required]
+        schema = mapping(keys, required=required, description=first_sentence(cls.__doc__))
+        return {**schema, **cls.json_rules(definitions)}
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """What misfit() demands, as far as JSON Schema can say it."""
+        return {}
 
     def changed(self, **values: Any) -> Self:
         """The same, but with these settings."""
@@ -144,3 +188,14 @@ class Part(Kind):
     def read(self, value: Any, place: Location, faults: Faults) -> Any:
         """As Kind."""
         return value if isinstance(value, self.section) else self.section.read(value, place, faults)
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return self.section.json_schema(definitions)
+
+
+def _plain(default: Any) -> Any:
+    """A default as a file has it."""
+    if isinstance(default, Section):
+        return {key: _plain(getattr(default, default.settings[key].attribute)) for key in default.given}
+    return default

@@ -1,10 +1,11 @@
 """Kinds of resources: which keys one has in a file and what they may be, as the registry tells it."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
 from mauve_rt._kernel import ResourceKind, ResourceParameter, given_resource_kinds
+from mauve_rt.file_schema.json_schema import JsonSchema, given, when
 from mauve_rt.file_schema.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
 from mauve_rt.file_schema.section import Setting
 from mauve_rt.file_schema.yaml_file import Location
@@ -67,6 +68,39 @@ def parameter_setting(parameter: ResourceParameter) -> Setting:
     """What a parameter may be in a file."""
     kind, hint = _kind_of(parameter), _hint(parameter)
     return Setting(kind, parameter.description, default=parameter.initial, hint=hint)
+
+
+def resource_schema(kind: ResourceKind, *, others: Iterable[str]) -> JsonSchema:
+    """What a kind adds to the schema of a resource; `others`: the keys that any kind has."""
+    own = [each for each in kind.parameters if each.file_key == each.name]
+    keys: JsonSchema = dict.fromkeys(others, True)
+    keys |= {each.name: parameter_setting(each).json_schema({}, unit=each.unit) for each in own}
+    patterns = {}
+    if kind.type_kind == "type":
+        counts = _SEQUENCE.json_schema({})
+        by_field = {"type": "object", "additionalProperties": counts}
+        keys[_CAPACITY] = {"anyOf": [by_field, keys[_CAPACITY]]} if _CAPACITY in keys else by_field
+        patterns = {"patternProperties": {rf"^{_CAPACITY}\.": counts}}
+    if kind.type_kind:
+        keys["type"] = {"minLength": 1}
+    elif kind.messages:
+        keys["type"] = {"enum": ["", *kind.messages]}
+    keys["service"] = service_schema(kind)
+    if is_client := kind.type_kind == "call_type":
+        keys["topic"] = {"type": "null"}
+    needed = [each.name for each in own if each.required]
+    needed += ["type"] if kind.type_kind else []
+    needed += ["service"] if is_client else []
+    return {"properties": keys, "required": needed, "additionalProperties": False, **patterns}
+
+
+def service_schema(kind: ResourceKind | None) -> JsonSchema:
+    """What a kind, or that of a plug-in, adds to the schema of its service."""
+    is_client = kind is not None and kind.type_kind == "call_type"
+    has_timeout = kind is not None and has_key(kind, "service.timeout_ms")
+    rules = [{"not": given("offers")} if is_client else given("offers")]
+    rules += [] if has_timeout else [{"properties": {"timeout_ms": False}}]
+    return {"type": "object", "allOf": rules} if is_client else when({"type": "object"}, {"allOf": rules})
 
 
 def _read(parameter: ResourceParameter, value: Any, place: Location, faults: Faults) -> Any:

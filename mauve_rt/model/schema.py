@@ -31,6 +31,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 from mauve_rt._kernel import TASK_SETTINGS
+from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, given, has, reference, when
 from mauve_rt.file_schema.kinds import (
     Choice,
     Fault,
@@ -47,7 +48,7 @@ from mauve_rt.file_schema.section import Part, Section, setting
 from mauve_rt.file_schema.words import listed
 from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model.kernel_settings import KernelSetting, kernel_setting
-from mauve_rt.model.resource_kinds import given_kinds, read_parameters
+from mauve_rt.model.resource_kinds import given_kinds, read_parameters, resource_schema, service_schema
 
 PropertyValue = bool | int | float | str
 
@@ -93,6 +94,10 @@ class _Alternatives(ListOf):
         faults.append(Fault(place, "form", limit=expected, found=value))
         return value
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return {"anyOf": [super().json_schema(definitions), {"const": "installed"}]}
+
 
 class ThresholdModel(Section):
     """From which figure on a status is a warning, and from which an error."""
@@ -107,6 +112,11 @@ class ThresholdModel(Section):
         if self.warn is not None and self.error is not None and self.warn > self.error:
             return Fault((), "form", limit="an error that is no less than warn")
         return None
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit()."""
+        return {"anyOf": [given("warn"), given("error")]}
 
 
 _THRESHOLD = Part(ThresholdModel)
@@ -177,6 +187,11 @@ class _Mirror(Part):
 
     def read(self, value: Any, place: Location, faults: Faults) -> Any:
         return super().read({"name": value} if isinstance(value, str) else value, place, faults)
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        name = self.section.settings["name"].kind
+        return {"anyOf": [name.json_schema(definitions), super().json_schema(definitions)]}
 
 
 class ExecutorModel(Section):
@@ -274,6 +289,11 @@ class _Qos(Part):
             return value
         return super().read({"profile": value} if isinstance(value, str) else value, place, faults)
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        profile = self.section.settings["profile"].kind
+        return {"anyOf": [profile.json_schema(definitions), super().json_schema(definitions)]}
+
 
 class TopicModel(Section):
     """The ROS topic that a resource is bound to; the name is relative to the executor's namespace."""
@@ -319,6 +339,11 @@ class TopicModel(Section):
             fault.hint = "leave deadline_ms out: the driver's time is offered"
             return fault
         return None
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit()."""
+        return when(given("driver_timeout_ms"), has("direction", "publish"))
 
 
 class ServiceModel(Section):
@@ -381,6 +406,18 @@ class ResourceModel(Section):
             told = read_parameters(kind, told, place, faults, others=tuple(self.settings))
         vars(self)["_parameters"] = told
 
+    @classmethod
+    def json_definition(cls, definitions: Definitions) -> JsonSchema:
+        """As of any section, but the kind says which other keys there are; of a plug-in's, any."""
+        schema = super().json_definition(definitions)
+        del schema["additionalProperties"]
+        for name, kind in given_kinds().items():
+            definitions[f"{name} resource"] = resource_schema(kind, others=cls.settings)
+        kinds = [when(has("kind", name), reference(f"{name} resource")) for name in given_kinds()]
+        of_plugin = {"properties": {"kind": {"pattern": "/"}}}
+        kinds.append(when(of_plugin, {"properties": {"service": service_schema(None)}}))
+        return {**schema, "allOf": kinds}
+
 
 class StateModel(Section):
     """Times of an execution state, in the place of what the fsm's own code says."""
@@ -409,6 +446,11 @@ class StateModel(Section):
         fault = Fault(("wcet_ns",), "form", limit=limit, found=self.wcet_ns)
         fault.hint = "lower wcet_ns, or raise max_execution_ns"
         return fault
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit()."""
+        return {"anyOf": [given(key) for key in cls.settings]}
 
 
 class ComponentModel(Section):

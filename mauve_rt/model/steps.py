@@ -15,13 +15,15 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
+from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, document, has, when
 from mauve_rt.file_schema.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text
 from mauve_rt.file_schema.schema_errors import expected
 from mauve_rt.file_schema.section import Section, setting
+from mauve_rt.file_schema.setting_words import sentence
 from mauve_rt.file_schema.words import cut, did_you_mean, nearest, shown
 from mauve_rt.file_schema.yaml_file import Location, YamlFile
-from mauve_rt.model.schema import IDENTIFIER_OR_NONE
-from mauve_rt.model.step_kinds import STEP_KINDS
+from mauve_rt.model.schema import IDENTIFIER_OR_NONE, ComponentModel, ResourceModel
+from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
 
 _SHOWN_VALUE = 60
 SHOWN_STEP = 300
@@ -48,6 +50,10 @@ class _YamlText(Text):
         is_value = isinstance(value, bool | int | float | dict)
         return super().read(json.dumps(value) if is_value else value, place, faults)
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": ["string", "boolean", "number", "object"]}
+
 
 class StepForm(Section):
     """A step as files have it."""
@@ -71,6 +77,27 @@ class StepForm(Section):
                 return Fault((), "rule", limit=f"a step of kind '{self.kind}' needs a {key}")
         return None
 
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:
+        """As misfit(), and the section of a new component or resource."""
+        return {
+            "allOf": [
+                when(has("kind", name), _step_schema(kind, definitions)) for name, kind in STEP_KINDS.items()
+            ]
+        }
+
+
+def _step_schema(kind: StepKind, definitions: Definitions) -> JsonSchema:
+    is_needed = {"target": kind.target != "all", "name": bool(kind.name), "value": kind.needs_value}
+    keys: JsonSchema = {key: {"not": {"const": ""}} for key, needed in is_needed.items() if needed}
+    if kind.target == "all":
+        keys["target"] = {"const": ""}
+    if kind.value == "section":
+        section = ResourceModel if kind.is_about_resource else ComponentModel
+        keys["value"] = when({"type": "object"}, section.json_schema(definitions)) | keys["value"]
+    needed = [key for key, needed in is_needed.items() if needed]
+    return {"description": sentence(kind.what), "properties": keys, "required": needed}
+
 
 class _StepPart(Kind):
     """A step within a section."""
@@ -82,6 +109,10 @@ class _StepPart(Kind):
         before = len(faults)
         form = StepForm.read(value, place, faults)
         return Step(form.kind, form.target, form.name, form.value) if len(faults) == before else form
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return StepForm.json_schema(definitions)
 
 
 STEPS = ListOf(_StepPart(), few=1)
@@ -121,6 +152,13 @@ def load_change(path: str | Path, *, text: str | None = None) -> Change:
         if not faults:
             return Change(steps=steps)
     raise form_error(file, faults)
+
+
+def steps_schema() -> JsonSchema:
+    """The JSON Schema of a steps file: a list, or a transaction."""
+    definitions: Definitions = {}
+    steps, change = STEPS.json_schema(definitions), Change.json_schema(definitions)
+    return document({"if": {"type": "array"}, "then": steps, "else": change}, definitions, name="steps")
 
 
 def place_of_step(file: YamlFile, index: int) -> Location:

@@ -9,8 +9,12 @@ NS_OF = {"ns": 1, "us": 1_000, "ms": 1_000_000, "s": 1_000_000_000}
 MOST_NS = 2**63 - 1  # FOREVER of the kernel
 EXPECTED = "a time such as 10 ms, or 5 * unit_ms of an integer property whose unit is ns, us, ms or s"
 _MOST_DIGITS = 18  # of a factor: no product of more fits into 64 bits
-_TIME = re.compile(r"(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>ns|us|ms|s)")
-_MULTIPLE = re.compile(r"(?:(?P<factor>[1-9]\d*)\s*\*\s*)?(?P<property>[A-Za-z]\w*)")
+_TIME = re.compile(r"(?=[\d.]*[1-9])(?P<number>\d+(?:\.\d+)?)\s*(?P<unit>ns|us|ms|s)", re.ASCII)
+_MULTIPLE = re.compile(
+    rf"(?:(?P<factor>[1-9]\d{{0,{_MOST_DIGITS - 1}}})\s*\*\s*)?(?P<property>[A-Za-z]\w*)", re.ASCII
+)
+PATTERN = f"{_TIME.pattern}|{_MULTIPLE.pattern}"
+"""Texts that may be one."""
 
 
 @dataclass(frozen=True)
@@ -33,8 +37,8 @@ def parse_duration(text: str) -> Duration | None:
         return Duration(ns=MOST_NS)
     if found := _TIME.fullmatch(text):
         ns = Decimal(found["number"]) * NS_OF[found["unit"]]
-        return Duration(ns=int(ns)) if ns == int(ns) and 0 < ns < MOST_NS else None
-    if (found := _MULTIPLE.fullmatch(text)) and len(found["factor"] or "") <= _MOST_DIGITS:
+        return Duration(ns=int(ns)) if ns == int(ns) and ns < MOST_NS else None
+    if found := _MULTIPLE.fullmatch(text):
         return Duration(factor=int(found["factor"] or 1), property_name=found["property"])
     return None
 

@@ -28,6 +28,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, given, has, text_form, when
 from mauve_rt.file_schema.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Real, Scalar, TableOf, Text
 from mauve_rt.file_schema.section import Part, Section, setting
 from mauve_rt.file_schema.yaml_file import Location
@@ -64,6 +65,10 @@ class _TypeName(Kind):
             faults.append(Fault(place, "form", limit=type_names.EXPECTED, found=value))
         return value if read is None else read
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": "string", **text_form(type_names.PATTERN, expected=type_names.EXPECTED)}
+
 
 class _Duration(Kind):
     """A length of time."""
@@ -74,6 +79,10 @@ class _Duration(Kind):
         if read is None and not isinstance(value, Duration):
             faults.append(Fault(place, "form", limit=durations.EXPECTED, found=value))
         return value if read is None else read
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:  # noqa: ARG002
+        """As Kind."""
+        return {"type": "string", **text_form(durations.PATTERN, expected=durations.EXPECTED)}
 
 
 class _OneOrMore(ListOf):
@@ -86,6 +95,10 @@ class _OneOrMore(ListOf):
             if isinstance(value, list)
             else [self.kind.read(value, place, faults)]
         )
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return {"anyOf": [self.kind.json_schema(definitions), super().json_schema(definitions)]}
 
 
 _TYPE, _TIME = _TypeName(), _Duration()
@@ -115,6 +128,11 @@ class _Type(Kind):
         is_existing = isinstance(value, dict) and "cpp" in value
         return CppType.read(value, place, faults) if is_existing else self._fields.read(value, place, faults)
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        existing, fields = CppType.json_schema(definitions), self._fields.json_schema(definitions)
+        return {"type": "object", "if": {"required": ["cpp"]}, "then": existing, "else": fields}
+
 
 class PropertyModel(Section):
     """A property of a shell."""
@@ -141,6 +159,21 @@ class PropertyModel(Section):
         if (rule := self._broken_rule()) is not None:
             return Fault(("default",), "form", limit=rule, found=self.default)
         return None
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit(), without the bounds of the property itself."""
+        defaults: Mapping[str, JsonSchema] = {
+            "bool": {"type": "boolean"},
+            "int64": {"type": "integer", "minimum": -(2**63), "maximum": 2**63 - 1},
+            "float64": {"type": "number"},
+            "string": {"type": "string"},
+        }
+        rules = [
+            when(has("type", name), {"properties": {"default": kind}}) for name, kind in defaults.items()
+        ]
+        ranged = {"anyOf": [given("minimum"), given("maximum")]}
+        return {"allOf": [*rules, when(ranged, has("type", "int64", "float64"))]}
 
     def _broken_rule(self) -> str | None:
         value = self.default
@@ -182,6 +215,10 @@ class _Call(Kind):
             else _SERVICE.read(value, place, faults)
         )
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return {"anyOf": [_SERVICE.json_schema(definitions), CppCall.json_schema(definitions)]}
+
 
 class PortModel(Section):
     """A port of a shell: one of read, write, call and event."""
@@ -208,6 +245,14 @@ class PortModel(Section):
             if getattr(self, name) is not None and self.write is None:
                 return Fault((name,), "form", limit="nothing: only a write port has one")
         return None
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit()."""
+        written = [when(given(key), given("write")) for key in ("on_commit", "on_stop")]
+        call = when(given("call"), {"properties": {"optional": {"const": False}}})
+        kinds = [*map(given, ("read", "write", "call")), has("event", True)]
+        return {"oneOf": kinds, "allOf": [*written, call]}
 
     @property
     def data_type(self) -> TypeName | None:
@@ -294,6 +339,11 @@ class _Next(Kind):
         read = _BranchModel.read(value, place, faults)
         return Branch(to=read.to, guard=read.guard) if len(faults) == before else value
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        branch = {"anyOf": [NAME.json_schema(definitions), _BranchModel.json_schema(definitions)]}
+        return {"anyOf": [*branch["anyOf"], {"type": "array", "items": branch, "minItems": 1}]}
+
 
 class EventModel(Section):
     """A wait for an event."""
@@ -326,6 +376,13 @@ class StateModel(Section):
             return Fault((), "missing", limit="next")
         return None
 
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit()."""
+        kinds = [given(key) for key in ("run", "wait", "wait_event")]
+        leads = {"if": has("wait", "forever"), "else": {"required": ["next"]}}
+        return {"oneOf": kinds, "allOf": [leads, when(given("max_execution"), given("run"))]}
+
 
 class FsmModel(Section):
     """A machine of states."""
@@ -351,6 +408,12 @@ class ParameterModel(PropertyModel):
                 ("read_by",), "form", limit="nothing: a resource reads its parameters when it is made"
             )
         return super().misfit()
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:
+        """As misfit()."""
+        rules = super().json_rules(definitions)["allOf"]
+        return {"allOf": [*rules, {"properties": {"read_by": {"type": "array", "maxItems": 0}}}]}
 
 
 class ServiceModel(Section):

@@ -15,9 +15,11 @@ EXPECTED = (
     "a number such as float64, string<=32, a type of the model, package/Name of another model, "
     "package/msg/Name; a list as float64[<=3]"
 )
-_FORM = re.compile(
-    r"(?P<item>[A-Za-z]\w*(?:/\w+){0,2})(?:<=(?P<text>\d+))?(?P<list>\[(?P<most><=)?(?P<count>\d*)\])?"
+PATTERN = (
+    r" *(?:string *<= *(?P<text>\d+)|(?P<item>[A-Za-z]\w*(?:/\w+){0,2}))"
+    r" *(?P<list>\[ *(?P<most><=)? *(?P<count>\d*) *\])? *"
 )
+_FORM = re.compile(PATTERN, re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -54,13 +56,12 @@ class TypeName:
 
 def parse_type(text: str) -> TypeName | None:
     """A type, taken apart; None where the text is none."""
-    text = text.replace(" ", "")
     found = _FORM.fullmatch(text)
-    if found is None or (found["text"] is not None and found["item"] != "string"):
+    if found is None:
         return None
     return TypeName(
-        text=text,
-        item=found["item"],
+        text=text.replace(" ", ""),
+        item=found["item"] or "string",
         length=int(found["text"]) if found["text"] else None,
         count=int(found["count"]) if found["count"] else None,
         is_list=found["list"] is not None,

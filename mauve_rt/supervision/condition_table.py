@@ -5,13 +5,16 @@ from types import MappingProxyType
 from typing import Any
 
 from mauve_rt._kernel import ConditionKind, ConditionParameter, condition_kinds
+from mauve_rt.file_schema.json_schema import JsonSchema, mapping
 from mauve_rt.file_schema.kinds import Choice, Flag, Kind, Real, Text, Whole
+from mauve_rt.file_schema.setting_words import described, sentence
 from mauve_rt.model.schema import IDENTIFIER, ROS_NAME
 
 __all__ = [
     "ConditionKind",
     "ConditionParameter",
     "choices",
+    "condition_schema",
     "conditions",
     "parameter_kind",
     "parameters_of",
@@ -26,7 +29,7 @@ _TEXTS: Mapping[str, Text] = {
     "resource": IDENTIFIER,
     "executor": ROS_NAME,
     "field": Text(r"[a-z]\w*(?:\[\d+\])*(?:\.[a-z]\w*(?:\[\d+\])*)*", "a field such as pose.position.x"),
-    "str": Text(r"(?s:.+)", "text that is not empty"),
+    "str": Text(r"[\s\S]+", "text that is not empty"),
 }
 
 
@@ -60,6 +63,24 @@ def parameter_kind(parameter: ConditionParameter) -> Kind:
             return Real(**{name: bound for name, bound in bounds.items() if bound is not None})
         case kind:
             return _TEXTS[kind]
+
+
+def condition_schema(kind: str) -> JsonSchema:
+    """The parameters of a kind of condition as JSON Schema."""
+    known = parameters_of(kind)
+    return mapping(
+        {name: _parameter_schema(each) for name, each in known.items()},
+        required=[name for name, each in known.items() if each.required],
+        description=sentence(f"holds while {conditions()[kind].summary}"),
+    )
+
+
+def _parameter_schema(parameter: ConditionParameter) -> JsonSchema:
+    kind = parameter_kind(parameter)
+    words = described("", kind, parameter.unit, parameter.initial)
+    description = {"description": words} if words else {}
+    default = {} if parameter.initial is None else {"default": parameter.initial}
+    return {**kind.json_schema({}), **default, **description}
 
 
 def roles(kind: str) -> Mapping[str, str]:

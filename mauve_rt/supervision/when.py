@@ -14,9 +14,11 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, defined, mapping
 from mauve_rt.file_schema.kinds import Fault, Faults, Kind, ListOf, Real, Whole
+from mauve_rt.file_schema.setting_words import described, sentence
 from mauve_rt.file_schema.yaml_file import Location
-from mauve_rt.supervision.condition_table import conditions, parameter_kind, parameters_of
+from mauve_rt.supervision.condition_table import condition_schema, conditions, parameter_kind, parameters_of
 
 ALL, ANY, NOT, AT_LEAST = "all", "any", "not", "at_least"
 COMBINATIONS: Mapping[str, str] = {
@@ -88,6 +90,23 @@ class WhenPart(Kind):
         node = self._node(named[0], value[named[0]], (*place, named[0]), faults)
         return When(**node, **times, place=place) if len(faults) == before else value
 
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return defined("Condition", definitions, self._json_definition)
+
+    def _json_definition(self, definitions: Definitions) -> JsonSchema:
+        one, several = self.json_schema(definitions), _parts(self).json_schema(definitions)
+        count = Whole(1, MOST_PARTS).json_schema(definitions)
+        at_least = mapping({"count": count, "of": several}, required=("count", "of"))
+        nodes = {ALL: several, ANY: several, NOT: one, AT_LEAST: at_least}
+        keys = {name: condition_schema(name) for name in conditions()}
+        for name, what in COMBINATIONS.items():
+            keys[name] = {**nodes[name], "description": sentence(f"holds while {what}")}
+        for name, what in TIMES.items():
+            keys[name] = {**_SECONDS.json_schema(definitions), "description": described(what, _SECONDS, "s")}
+        kinds = [{"required": [name]} for name in (*conditions(), *COMBINATIONS)]
+        return {**mapping(keys, description="One condition, or one combination of them."), "oneOf": kinds}
+
     def _node(self, kind: str, value: Any, place: Location, faults: Faults) -> dict[str, Any]:
         if kind == NOT:
             return {"kind": kind, "parts": (self.read(value, place, faults),)}
@@ -116,8 +135,12 @@ class WhenPart(Kind):
 
 
 def _elements(kind: Kind, value: Any, place: Location, faults: Faults) -> list[Any]:
-    read = ListOf(kind, few=1, many=MOST_PARTS).read(value, place, faults)
+    read = _parts(kind).read(value, place, faults)
     return read if isinstance(read, list) else []
+
+
+def _parts(kind: Kind) -> ListOf:
+    return ListOf(kind, few=1, many=MOST_PARTS)
 
 
 def read_condition(kind: str, value: Any, place: Location, faults: Faults) -> dict[str, Any]:

@@ -29,6 +29,7 @@ def test_a_new_package_runs_to_its_first_swap(
 ) -> None:
     robot = new_robot("my_robot")
     robot.build()
+    assert robot.warnings() == ""
     with robot.running():
         record_property("seconds_to_the_swap", robot.swap())
     with robot.running("--rules", "architecture/rules.yaml", "--ros-args", "-p", "drive.speed:=2.0"):
@@ -56,6 +57,7 @@ def test_a_new_package_in_python_runs_to_its_first_swap_and_takes_all_parts(
     ):
         robot.mauve("new", *words)
     said = robot.build("--debug", "--test")
+    assert robot.warnings() == ""
     assert passed(said) == {"test_lift_arm", "test_fast", "test_tally", "architecture", "pytest"}
     prefix = robot.folder / "install"
     index = (prefix / "share/ament_index/resource_index/mauve_rt_plugins/py_robot").read_text("utf-8")

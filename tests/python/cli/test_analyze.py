@@ -134,7 +134,7 @@ def test_the_model_in_words(analyze: Analyze) -> None:
     assert "  Count: missing\n" in out
     assert "  response without a bound: guard may delay it, and nothing is proved of that\n" not in out
     assert "  response at most 0.223 ms, its deadline of 5.000 ms is met\n" in out
-    assert "thread 'watchdog': any CPU, priority 99, 0.023 ms, declared every 1.000 ms\n" in out, "of guard"
+    assert "thread 'watchdog': any CPU, priority 99, at most 0.023 ms every 1.000 ms\n" in out, "of guard"
     assert out.endswith(
         "not provable: something is missing of guard, python\n"
         "  guard: it may run on any CPU: pin it to one (cpus in the architecture file)\n"
@@ -467,7 +467,7 @@ def test_a_sender_above_a_component_is_part_of_its_response(analyze: Analyze) ->
     declared = text.replace("cpus: [0]}}", "cpus: [0], wcet_ns: 400000, min_interarrival_ns: 10000000}}", 1)
     status, out, _ = analyze(declared)
     assert status == 0
-    assert "thread 'topics_out': CPU 0, priority 35, 0.400 ms, declared every 10.000 ms\n" in out
+    assert "thread 'topics_out': CPU 0, priority 35, at most 0.400 ms every 10.000 ms\n" in out
     assert "  response at most 17.600 ms, its deadline of 20.000 ms is met\n" in out
     assert analyze(text.replace("priority: 35", "priority: 10"))[0] == 0
 
@@ -478,7 +478,7 @@ def test_a_preempted_state_is_faulted_in_the_witness(analyze: Analyze, tmp_path:
     status, out, _ = analyze(text, "--witness", str(bag))
     assert status == 1
     assert "  Count: 10.000 ms, declared, faulted above 11.000 ms\n" in out
-    assert "thread 'watchdog': any CPU, priority 99, 0.022 ms, declared every 1.000 ms\n" in out
+    assert "thread 'watchdog': any CPU, priority 99, at most 0.022 ms every 1.000 ms\n" in out
     assert "not schedulable: slow is faulted: Count lasts 13." in out
     assert main(["trace", "check", str(bag)]) == 0
     longer = text.replace("max_execution_ns: 11000000", "max_execution_ns: 17000000")
@@ -513,3 +513,28 @@ def test_a_bag_that_shows_more_than_the_bounds_refutes_the_model(analyze: Analyz
     assert status == 5, out
     assert "model refuted: quick took " in out
     assert ", and its bound is 3.000 ms: " in out
+
+
+def test_another_executor_on_the_computer_takes_its_cpu(analyze: Analyze, tmp_path: Path) -> None:
+    loop = "{shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm"
+    other = tmp_path / "other.yaml"
+    text = f"mauve: 1\ncomponents:\n  quick: {loop}, priority: 70, cpus: [0], properties: {{period_ms: 10}}"
+    other.write_text(f"{text}, states: {{Count: {{wcet_ns: 6500000}}}}}}\n", encoding="utf-8")
+    status, out, _ = analyze(PAIR.replace("13950000", "1000000"), "--beside", str(other))
+    assert status == 0
+    assert "thread 'other.yaml:quick': CPU 0, priority 70, at most 6.500 ms every 10.000 ms\n" in out
+    assert "  response at most 9.500 ms, its deadline of 10.000 ms is met\n" in out
+    status, out, _ = analyze(PAIR, "--beside", str(other))
+    assert status == 1
+    assert "of other.yaml:quick" in out
+    other.write_text(f"{text}}}\n", encoding="utf-8")
+    status, out, _ = analyze(PAIR, "--beside", str(other))
+    assert status == 3
+    why = "its time is not declared: declare the times of quick in other.yaml"
+    assert f"  other.yaml:quick: {why}\n" in out
+
+
+def test_a_robot_with_more_cpus_than_this_computer(analyze: Analyze) -> None:
+    status, out, err = analyze(PAIR.replace("priority: 30, cpus: [0]", "priority: 30, cpus: [61]"))
+    assert (status, err) == (0, "")
+    assert "slow: CPU 61, priority 30" in out

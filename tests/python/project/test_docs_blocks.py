@@ -85,7 +85,8 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "cpus: [1]": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
         "deadline_ns: 5000000": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
         "--budget-from BAG": ("ros/cli/test_analyze.py::test_a_file_a_node_and_a_bag_tell_one_model",),
-        "--wakeup-us 1000": (HOWTO_ANALYZE,),
+        "executor: {wakeup_us": ("python/cli/test_analyze_pages.py::test_the_pieces_of_files_are_accepted",),
+        "architecture/robot.yaml\n": (HOWTO_ANALYZE,),
         "schedulable: every component": (HOWTO_ANALYZE,),
         "--suppose guidance.Planning=120ms --witness slow": (HOWTO_ANALYZE,),
         "not schedulable: mapping": (HOWTO_ANALYZE,),
@@ -133,7 +134,7 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "mauve trace stats docs/sample/metronome": (WAKEUP,),
         "metronome  wake-up latency": (WAKEUP,),
         "--wakeup-us 300": (WAKEUP,),
-        "threads begin 300 us": (WAKEUP,),
+        "each release begins up to 0.300 ms": (WAKEUP,),
         "wakeup_max_us: {warn: 300": (PINNED,),
     },
     "docs/howto/record_and_report.md": {

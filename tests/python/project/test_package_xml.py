@@ -24,6 +24,7 @@ MODULES = {
     "hypothesis": ("python3-hypothesis", "hypothesis"),
     "matplotlib": ("python3-matplotlib", "matplotlib"),
     "jinja2": ("python3-jinja2", "jinja2"),
+    "jsonschema": ("python3-jsonschema", "jsonschema"),
     "lz4": ("", "mcap"),  # comes with it
     "markdown_it": ("", "rich"),  # comes with it
     "mcap": ("", "mcap"),

@@ -4,18 +4,23 @@ tests/ros/test_new_packages.py builds and runs what `mauve new` writes.
 """
 
 import ast
+import json
 import os
 import shutil
 from pathlib import Path
 
 import pytest
+from jsonschema import Draft202012Validator
 
 from mauve_rt.cli import build_verb, run_verb
 from mauve_rt.cli.main import main
 from mauve_rt.errors import ParameterError
+from mauve_rt.file_schema.yaml_file import YamlFile
+from mauve_rt.model.file_kinds import file_kind
 from mauve_rt.scaffold import rendering
 from mauve_rt.scaffold.names import check_package, part_names
 from mauve_rt.scaffold.package import find_package
+from mauve_rt.scaffold.schemas import file_schema
 
 
 @pytest.fixture(autouse=True)
@@ -75,6 +80,39 @@ def test_a_part_has_the_name_of_a_class_and_of_a_file(name: str, names: tuple[st
 def test_a_part_that_is_no_identifier_is_refused(name: str) -> None:
     with pytest.raises(ParameterError, match="Choose"):
         part_names(name)
+
+
+@pytest.mark.parametrize("language", [[], ["--python"]])
+def test_each_new_yaml_file_names_its_schema(language: list[str], here: Path) -> None:
+    main(["new", "package", "robot_1", *language])
+    main(["new", "rules", "repair", "--in", "robot_1"])
+    written = sorted(here.glob("robot_1/architecture/*.yaml"))
+    assert [path.name for path in written] == ["repair_rules.yaml", "robot.yaml", "rules.yaml"]
+    for path in written:
+        named = path.read_text().splitlines()[0].removeprefix("# yaml-language-server: $schema=")
+        schema = json.loads((path.parent / named).read_text())
+        assert schema == file_schema(file_kind(path))
+        Draft202012Validator(schema).validate(YamlFile(path).data)
+    assert (here / "robot_1/.mauve/.gitignore").read_text() == "*\n"
+
+
+def test_a_build_brings_the_schemas_of_a_package_up_to_date(
+    here: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    main(["new", "package", "robot_1"])
+    schemas = here / "robot_1/.mauve"
+    before = files(schemas)
+    (schemas / "schema/rules.schema.json").write_text("{}")
+    (schemas / "schema/model.schema.json").unlink()
+    kept = (schemas / "schema/steps.schema.json").stat().st_mtime_ns
+    monkeypatch.setattr(build_verb, "_cmake", lambda *_, **__: iter([["false"]]))  # the schemas come first
+    assert main(["build", "robot_1"]) == 1
+    assert files(schemas) == before
+    assert (schemas / "schema/steps.schema.json").stat().st_mtime_ns == kept
+    shutil.rmtree(schemas)
+    schemas.write_text("a file where the folder is to be")
+    assert main(["build", "robot_1"]) == 1
+    assert "mauve: no schemas for editors: " in capsys.readouterr().err
 
 
 def test_a_package_is_never_overwritten(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

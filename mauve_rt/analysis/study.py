@@ -1,0 +1,86 @@
+"""An architecture analyzed: its components, their bounds, and the verdict; and a change of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from mauve_rt.analysis.bounds import Bound, Subject, bounds_of
+from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.obstacles import unknown_costs
+from mauve_rt.analysis.plan import Handovers, bounds_during, subjects_during
+from mauve_rt.analysis.refutation import Measured, contradictions
+from mauve_rt.analysis.threads import machines_of
+from mauve_rt.analysis.verdict import Verdict, judge
+
+
+@dataclass(frozen=True)
+class Study:
+    """What is known of an architecture."""
+
+    subjects: Sequence[Subject]
+    """Components, then threads."""
+    bounds: Mapping[str, Bound]
+    """Of the components, by name."""
+    verdict: Verdict
+    unknown: Sequence[str]
+    """What is not known beside them, in words."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surroundings:
+    """What runs beside the components, and what a release costs."""
+
+    threads: Any
+    """With the fields of mauve_msgs/msg/TaskList."""
+    beside: tuple[Machine, ...] = ()
+    """Threads of other executors on this computer."""
+    unknown: tuple[str, ...] = ()
+    """What nothing tells, in words."""
+    measured: tuple[str, ...] = ()
+    """Of what else times are measured."""
+
+    @property
+    def wakeup_ns(self) -> int:
+        """How late a release is at most; 0: or it is not known."""
+        return max(int(self.threads.wakeup_ns), 0)
+
+    @property
+    def overhead_ns(self) -> int:
+        """Of a release; 0: or it is not known."""
+        return max(int(self.threads.overhead_ns), 0)
+
+
+def study(
+    components: Sequence[Machine],
+    surroundings: Surroundings,
+    *,
+    measured: Mapping[str, Measured] | None = None,
+) -> Study:
+    """An architecture; `measured`: what a recording of it shows, by component."""
+    threads = machines_of(surroundings.threads.tasks, components)
+    machines = [*components, *threads, *surroundings.beside]
+    subjects = [Subject.of(machine, machines, overhead_ns=surroundings.overhead_ns) for machine in machines]
+    wakeup_ns = surroundings.wakeup_ns
+    bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
+    unknown = [*unknown_costs(surroundings.threads), *surroundings.unknown]
+    verdict = judge(
+        subjects,
+        bounds,
+        wakeup_ns=wakeup_ns,
+        unknown=unknown,
+        measured=surroundings.measured,
+        contradictions=[*contradictions(subjects, bounds, measured or {}, wakeup_ns=wakeup_ns)],
+    )
+    return Study(subjects, bounds, verdict, unknown)
+
+
+def study_of_change(before: Study, after: Study, handovers: Handovers, surroundings: Surroundings) -> Study:
+    """What holds while the change from the one to the other is made, whenever that is.
+
+    `handovers`: of components that get a new core.
+    """
+    subjects = subjects_during(before.subjects, after.subjects, handovers)
+    wakeup_ns = surroundings.wakeup_ns
+    bounds = bounds_during(before.subjects, after.subjects, handovers, wakeup_ns=wakeup_ns)
+    verdict = judge(subjects, bounds, unknown=before.unknown, measured=surroundings.measured, searches=False)
+    return Study(subjects, bounds, verdict, before.unknown)

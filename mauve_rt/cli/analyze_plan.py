@@ -1,0 +1,175 @@
+"""`mauve analyze FILE --plan FILE`: the verdicts on a change, while it is made and after it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from mauve_rt._kernel import PluginRegistry
+from mauve_rt.analysis.machines import ExecutionTime, Machine, State
+from mauve_rt.analysis.plan import Handovers
+from mauve_rt.analysis.study import Study, Surroundings, study, study_of_change
+from mauve_rt.cli.analyzed import Analyzed, analyzed, is_python_part
+from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.model import ArchitectureModel, PluginIndex
+from mauve_rt.model.file_kinds import FileKind, file_kind
+from mauve_rt.model.fragment import fragment
+from mauve_rt.model.steps import Change, Step, load_change
+from mauve_rt.model.threads import ThreadList, thread_list, uses_of
+from mauve_rt.supervision.rehearsal import before_and_after
+
+_NEW_CORE = ("replace_core", "replace_shell", "configure", "promote")
+"""Kinds of steps that put a new instance of the core in, which takes the state of the old one."""
+
+
+class Plan(NamedTuple):
+    """What is known of a change."""
+
+    during: Study
+    after: Study
+
+
+def planned(
+    path: Path, found: Analyzed, now: Study, components: Sequence[Machine], surroundings: Surroundings
+) -> Plan:
+    """The change that a file says: of steps, or of the architecture after it.
+
+    Args:
+        path: the file.
+        found: the architecture before, of a file.
+        now: what is known of it.
+        components: it has, with their times.
+        surroundings: what runs beside them.
+
+    Raises:
+        ArchitectureFileError: the file is no such file, or the executor would refuse a step.
+
+    """
+    if found.model is None:
+        raise ValueError("a plan is judged for an architecture file")
+    if file_kind(path) is FileKind.ARCHITECTURE:
+        machines, threads, handovers = _by_file(path, found.model)
+    else:
+        machines, threads, handovers = _by_steps(load_change(path), path, found.model, components)
+    later = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
+    there = study(machines, later)
+    return Plan(study_of_change(now, there, handovers, later), there)
+
+
+class Alternative(NamedTuple):
+    """A core that may take the place of a component's core."""
+
+    component: str
+    core: str
+    is_fallback: bool
+    plan: Plan
+
+
+def alternatives(
+    found: Analyzed, now: Study, components: Sequence[Machine], surroundings: Surroundings
+) -> Iterator[Alternative]:
+    """Each core that an architecture file names as an alternative or a fallback; arguments as planned().
+
+    Raises:
+        ArchitectureFileError: the executor would refuse the core.
+
+    """
+    model = found.model
+    if model is None:
+        raise ValueError("alternatives are judged for an architecture file")
+    index = PluginIndex.installed()
+    for name, part in model.components.items():
+        listed = part.alternatives if isinstance(part.alternatives, list) else []
+        cores = [core for core in listed if index.find("core", core) is not None and core != part.core]
+        for core in dict.fromkeys([*cores, *([part.fallback] if part.fallback else [])]):
+            change = Change(steps=[Step("replace_core", name, core)])
+            machines, threads, handovers = _by_steps(change, model.path, model, components)
+            later = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
+            there = study(machines, later)
+            plan = Plan(study_of_change(now, there, handovers, later), there)
+            yield Alternative(name, core, core == part.fallback, plan)
+
+
+_After = tuple[list[Machine], ThreadList, Handovers]
+
+
+def _by_file(path: Path, before: ArchitectureModel) -> _After:
+    """The architecture after the change; components of one name are the same component."""
+    after = analyzed(str(path), ())
+    if after.model is None or after.registry is None or after.threads is None:
+        raise ValueError("an architecture file has a model")
+    cores = {name: part.core for name, part in after.model.components.items()}
+    handovers = {
+        name: _budget_ns(after.registry, cores[name])
+        for name, part in before.components.items()
+        if cores.get(name, part.core) != part.core
+    }
+    return after.components, after.threads, handovers
+
+
+def _by_steps(change: Change, path: Path, model: ArchitectureModel, components: Sequence[Machine]) -> _After:
+    before, after = before_and_after(path, change, model)
+    cores = {part.name: part.core for part in before.components}
+    kinds = {resource.name: resource.kind for resource in after.resources}
+    known = {machine.name: machine for machine in components}
+    changed = {step.target for step in change.steps}
+    index = PluginIndex.installed()
+    machines: list[Machine] = []
+    handovers: dict[str, int | None] = {}
+    for part in after.components:
+        machine = Machine.of(part, is_python=is_python_part(part, index), kinds=kinds)
+        if part.name in known and part.name not in changed:
+            machine = known[part.name]
+        elif part.core != cores.get(part.name, part.core):
+            machine = _of_other_core(machine, part, model, cores[part.name])
+        machines.append(machine)
+        if part.name in cores and _has_new_core(part.name, change):
+            handovers[part.name] = _budget_ns(SimulatedRuntime.registry, part.core)
+    return machines, _threads_after(model, change, machines), handovers
+
+
+def _has_new_core(component: str, change: Change) -> bool:
+    return any(step.target == component and step.kind in _NEW_CORE for step in change.steps)
+
+
+def _budget_ns(registry: PluginRegistry, core: str) -> int | None:
+    """That a core declares for adopt and take together; None: it declares none."""
+    return registry.describe_core(core).budget_ns or None
+
+
+def _of_other_core(machine: Machine, part: Any, model: ArchitectureModel, before: str) -> Machine:
+    """Without the worst cases that the file declares: they are those of the core that was there before."""
+    declared = model.components[part.name].states if part.name in model.components else {}
+    times = SimulatedRuntime.registry.describe_core(part.core).wcet_ns
+    described = {state.name: state for state in part.states}
+    states = tuple(
+        replace(state, time=_own_time(state, described[state.name], times, part.core, before))
+        if state.name in declared and declared[state.name].wcet_ns is not None
+        else state
+        for state in machine.states
+    )
+    return replace(machine, states=states)
+
+
+def _own_time(
+    state: State, described: Any, times: Mapping[str, int], core: str, before: str
+) -> ExecutionTime:
+    methods = [*([] if state.is_wait else [described.action]), *described.guards]
+    if all(method in times for method in methods):
+        return ExecutionTime(sum(times[method] for method in methods), f"declared by core {core}")
+    return ExecutionTime(why_missing=f"the file declares the time of core {before}, not of {core}")
+
+
+def _threads_after(model: ArchitectureModel, change: Change, machines: Sequence[Machine]) -> ThreadList:
+    """With the users of resources that the change adds."""
+    uses = uses_of(model)
+    for added in _added_resources(model, change):
+        uses |= uses_of(added)
+    has_bounds = any(state.limit_ns for machine in machines for state in machine.states)
+    return thread_list(model.executor, uses, components=len(machines), has_bounds=has_bounds)
+
+
+def _added_resources(model: ArchitectureModel, change: Change) -> Iterator[ArchitectureModel]:
+    for step in change.steps:
+        if step.kind == "add_resource":
+            yield fragment(model, step.value, section="resources", name=step.target)

@@ -1,0 +1,169 @@
+"""Bounds while a change is made: exact by hand, sound against runs, one instant for all participants."""
+
+from random import Random
+
+import pytest
+from random_digraphs import random_digraph
+from schedule_simulation import RUN, Release, simulate
+
+from mauve_rt.analysis import Task
+from mauve_rt.analysis import change as module
+from mauve_rt.analysis.change import Member, Participant, times_during
+from mauve_rt.analysis.digraph import DigraphTask, Job
+from mauve_rt.analysis.digraph_times import Component, digraph_times
+
+
+def loop(name: str, cost: int, separation: int, priority: int, *, part: str = "") -> Component:
+    job = Job("W", (part,), cost, "W", separation, 10**6)
+    return Component(DigraphTask(name, (job,)), priority)
+
+
+def responses(members: list[Member], *, jitter_ns: int = 0) -> dict[str, int | None]:
+    return {name: one.response_ns for name, one in times_during(members, jitter_ns=jitter_ns).items()}
+
+
+def test_without_a_participant_the_bounds_are_those_of_the_architecture() -> None:
+    for seed in range(200):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        members = [
+            Component(random_digraph(random, f"T{number}", share=0.25, most_waits=2), random.randint(1, 3))
+            for number in range(3)
+        ]
+        jitter_ns = random.choice((0, 2))
+        exact = digraph_times(members, jitter_ns=jitter_ns)
+        for name, found in times_during(members, jitter_ns=jitter_ns).items():
+            if exact[name].response_ns is not None:
+                assert found.response_ns is not None
+                assert found.response_ns >= exact[name].response_ns, (seed, name)
+
+
+def test_both_ends_are_schedulable_and_the_one_below_misses_in_the_change() -> None:
+    """The change lets the long job of a before it and the long job of b after it meet in one window."""
+    a = Participant(loop("a", 6, 16, 80), loop("a", 2, 16, 80))
+    b = Participant(loop("b", 2, 16, 70), loop("b", 6, 16, 70))
+    c = loop("c", 6, 48, 60)
+    assert digraph_times([a.old, b.old, c])["c"].response_ns == 14
+    assert digraph_times([a.new, b.new, c])["c"].response_ns == 14
+    found = responses([a, b, c])
+    assert found == {"a": 6, "b": 11, "c": 26}, "b comes 1 after the job of a that began before the change"
+
+
+def test_all_participants_change_at_one_instant() -> None:
+    """Each by itself could ask for its two long jobs in a window, but not both: one is long before T only."""
+    a = Participant(loop("a", 4, 10, 80), loop("a", 1, 10, 80))
+    b = Participant(loop("b", 1, 10, 70), loop("b", 4, 10, 70))
+    found = responses([a, b, loop("c", 2, 100, 60)])
+    assert found["c"] == 4 + 4 + 2, "not 4 + 4 + 2 of each job that there can be"
+
+
+def test_the_handover_counts_once() -> None:
+    a = Participant(loop("a", 3, 20, 80), loop("a", 3, 20, 80), handover_ns=2)
+    found = responses([a, loop("c", 4, 100, 60)])
+    assert found == {"a": 5, "c": 9}
+
+
+def test_one_that_is_added_or_removed_delays_those_below() -> None:
+    c = loop("c", 4, 100, 60)
+    assert responses([Participant(None, loop("new", 3, 20, 80)), c]) == {"new": 3, "c": 7}
+    assert responses([Participant(loop("old", 3, 20, 80), None), c]) == {"old": 3, "c": 7}
+
+
+def test_an_overload_after_the_change_is_said() -> None:
+    a = Participant(loop("a", 3, 10, 80), loop("a", 9, 10, 80))
+    found = times_during([a, loop("c", 2, 10, 60)])["c"]
+    assert found.reason == "the utilization at this priority is 1.1: nothing is left"
+
+
+# ---- against runs
+
+
+def random_members(random: Random) -> list[Member]:
+    """Two to four, one of them at least with other parts after the change."""
+    members: list[Member] = []
+    count = random.randint(2, 4)
+    share = random.uniform(0.3, 0.8) / count
+    for number in range(count):
+        name, priority = f"T{number}", random.randint(1, 3)
+        old, new = (
+            Component(random_digraph(random, name, share=share, most_waits=2), priority) for _ in range(2)
+        )
+        if number == 0 or random.random() < 0.5:
+            kind = random.random()
+            handover_ns = random.choice((0, 0, 2))
+            if kind < 0.1:
+                members.append(Participant(None, new))
+            elif kind < 0.2:
+                members.append(Participant(old, None))
+            else:
+                members.append(Participant(old, new, handover_ns))
+        else:
+            members.append(old)
+    return members
+
+
+def one_run(random: Random, member: Member, change_ns: int, *, until: int, jitter: int) -> list[Release]:
+    """Old jobs released before the change, then new ones; the handover is part of the first new one."""
+    is_changed = isinstance(member, Participant)
+    old = member.old if is_changed else member
+    new = member.new if is_changed else None
+    found: list[Release] = []
+    nominal, last = random.choice((0, 0, random.randint(0, 20))), 0
+    is_dense = random.random() < 0.7
+
+    def release(job: Job, more_ns: int) -> None:
+        nonlocal nominal, last
+        last = max(last, nominal + random.choice((0, random.randint(0, jitter))))
+        found.append(Release(nominal, last, [(RUN, (job.cost_ns or 0) + more_ns)]))
+        nominal += job.separation_ns + (0 if is_dense else random.choice((0, random.randint(0, 9))))
+
+    if old is not None:
+        job = random.choice(old.task.jobs)
+        while nominal < (change_ns if is_changed else until):
+            release(job, 0)
+            job = random.choice(old.task.after(job))
+    if new is not None:
+        nominal = max(nominal, change_ns)
+        job, more_ns = random.choice(new.task.jobs), member.handover_ns if is_changed else 0
+        while nominal < until:
+            release(job, more_ns)
+            job, more_ns = random.choice(new.task.after(job)), 0
+    return found
+
+
+def test_runs_find_that_only_the_begin_of_a_window_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_instants", lambda _mixes: iter([0]))
+    with pytest.raises(AssertionError, match="seed"):
+        test_no_run_with_a_change_is_above_its_bound(0)
+
+
+@pytest.mark.parametrize("jitter", [0, 3])
+def test_no_run_with_a_change_is_above_its_bound(jitter: int) -> None:
+    bounded = reached = 0
+    for seed in range(400):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        members = random_members(random)
+        found = times_during(members, jitter_ns=jitter)
+        parts = dict(zip(found, members, strict=True))
+        tasks = [
+            Task(name=name, cpu=0, priority=priority_of(one), separation_ns=1, cost_ns=1, deadline_ns=1)
+            for name, one in parts.items()
+        ]
+        longest = dict.fromkeys(parts, 0)
+        for _ in range(8):
+            change_ns = random.randint(0, 120)
+            runs = {
+                name: one_run(random, one, change_ns, until=240, jitter=jitter) for name, one in parts.items()
+            }
+            for name, response_ns in simulate(tasks, runs).items():
+                longest[name] = max(longest[name], response_ns)
+        for name, one in found.items():
+            if one.response_ns is not None:
+                assert longest[name] <= one.response_ns, f"seed {seed}, {name}"
+                bounded += 1
+                reached += longest[name] == one.response_ns
+    assert bounded > 400
+    assert reached > bounded / 10
+
+
+def priority_of(member: Member) -> int:
+    return member.any.priority if isinstance(member, Participant) else member.priority

@@ -1,0 +1,138 @@
+"""`mauve analyze FILE --plan FILE`: the verdicts on a change, while it is made and after it."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from mauve_rt.cli.main import main
+
+Plan = Callable[..., tuple[int, str, str]]
+
+PAIR = """\
+mauve: 1
+executor: {wakeup_us: 0, overhead_ns: 0}
+components:
+  a: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+      priority: 80, cpus: [0], properties: {period_ms: 16}, states: {Count: {wcet_ns: 6000000}}}
+  b: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+      priority: 70, cpus: [0], properties: {period_ms: 16}, states: {Count: {wcet_ns: 2000000}}}
+  c: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+      priority: 60, cpus: [0], properties: {period_ms: 48}, deadline_ns: 18000000,
+      states: {Count: {wcet_ns: 6000000}}}
+"""
+
+TIMED = """\
+mauve: 1
+executor: {wakeup_us: 0, overhead_ns: 0}
+components:
+  one: {shell: executor_tests/TimedShell, core: executor_tests/Timed, fsm: executor_tests/TimedFsm,
+        alternatives: [executor_tests/HalfTimed, executor_tests/Timed], priority: 40, cpus: [0]}
+  low: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+        alternatives: [executor_tests/Backwards], priority: 30, cpus: [0], properties: {period_ms: 50},
+        states: {Count: {wcet_ns: 1000000}}}
+"""
+AGAIN = "- {kind: replace_core, target: one, name: executor_tests/Timed}\n"
+
+
+@pytest.fixture
+def plan(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Plan:
+    """plan(ARCHITECTURE, CHANGE, WORD...): status, stdout, stderr."""
+
+    def run(before: str, change: str, *words: str) -> tuple[int, str, str]:
+        file, steps = tmp_path / "robot.yaml", tmp_path / "change.yaml"
+        file.write_text(before, encoding="utf-8")
+        steps.write_text(change, encoding="utf-8")
+        status = main(["analyze", str(file), "--plan", str(steps), *words])
+        said = capsys.readouterr()
+        return status, said.out, said.err.replace(f"{tmp_path}/", "")
+
+    return run
+
+
+def test_a_change_between_two_schedulable_architectures_is_not_proved(plan: Plan) -> None:
+    after = PAIR.replace("6000000}}}\n  b", "2000000}}}\n  b").replace("2000000}}}\n  c", "6000000}}}\n  c")
+    status, out, err = plan(PAIR, after)
+    assert (status, err) == (3, "")
+    assert "schedulable: every component meets its deadline, if\n" in out
+    assert out.endswith(
+        "during the change: not proved: c has a bound of 26.000 ms and a deadline of 18.000 ms\n"
+        "after it: schedulable: every component meets its deadline\n"
+    )
+    told = json.loads(plan(PAIR, after, "--json")[1])
+    assert told["verdict"]["outcome"] == told["plan"]["after"]["outcome"] == "schedulable"
+    assert told["plan"]["during"]["outcome"] == "not proved"
+    assert told["plan"]["during"]["responses"]["c"]["response_ns"] == 26_000_000
+    assert plan(PAIR, PAIR)[0] == 0, "nothing changes"
+
+
+def test_a_change_by_steps_with_its_handover(plan: Plan) -> None:
+    status, out, err = plan(TIMED, AGAIN, "--json")
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    now = {one["name"]: one["response"]["response_ns"] for one in told["components"]}
+    during = {name: one["response_ns"] for name, one in told["plan"]["during"]["responses"].items()}
+    assert during["one"] == now["one"] + 100_000, "its core declares budget_ns"
+    assert during["low"] == now["low"] + 100_000
+    after = {name: one["response_ns"] for name, one in told["plan"]["after"]["responses"].items()}
+    assert after == now
+
+
+def test_times_of_one_core_are_not_those_of_another(plan: Plan) -> None:
+    status, out, _ = plan(TIMED, "- {kind: replace_core, target: one, name: executor_tests/HalfTimed}\n")
+    assert status == 3
+    assert "after it: not provable: something is missing of one\n" in out
+    assert "core executor_tests/HalfTimed declares no time of is_enabled" in out
+    status, out, _ = plan(TIMED, "- {kind: replace_core, target: low, name: executor_tests/Backwards}\n")
+    assert status == 3
+    why = "the file declares the time of core executor_tests/Counter, not of executor_tests/Backwards"
+    assert f"  low: no time is known of Count ({why}): " in out
+    assert "  low: its new core declares no budget_ns of adopt and take: declare it\n" in out
+
+
+def test_one_that_is_added_delays_those_below(plan: Plan) -> None:
+    part = (
+        "{shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm, "
+        "priority: 75, cpus: [0], properties: {period_ms: 20}, states: {Count: {wcet_ns: 3000000}}}"
+    )
+    steps = f"- {{kind: add_component, target: more, value: {part}}}\n"
+    status, out, err = plan(TIMED, steps, "--json")
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    now = {one["name"]: one["response"]["response_ns"] for one in told["components"]}
+    for when in ("during", "after"):
+        found = {name: one["response_ns"] for name, one in told["plan"][when]["responses"].items()}
+        assert found == {"one": now["one"] + 3_000_000, "low": now["low"] + 3_000_000, "more": 3_000_000}
+
+
+def test_what_the_executor_would_refuse_is_refused(plan: Plan) -> None:
+    status, out, err = plan(TIMED, "- {kind: replace_core, target: one, name: executor_tests/None}\n")
+    assert (status, out) == (2, "")
+    assert err.startswith("mauve: change.yaml:1:3: core 'executor_tests/None' is not installed")
+
+
+def test_a_plan_is_for_a_file(plan: Plan, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["analyze", "/robot_1/executor", "--plan", "change.yaml"]) == 2
+    why = "mauve: --plan: expected an architecture FILE whose parts are installed\n"
+    assert capsys.readouterr().err == why
+
+
+def test_alternatives_and_fallbacks_have_verdicts_of_their_own(plan: Plan) -> None:
+    fallback = "properties: {period_ms: 50}, fallback: executor_tests/Counter"
+    text = TIMED.replace("properties: {period_ms: 50}", fallback)
+    status, out, err = plan(text, AGAIN, "--alternatives")
+    assert (status, err) == (3, "")
+    missing = "not provable: something is missing of"
+    assert f"with alternative executor_tests/HalfTimed of one: {missing} one\n" in out
+    assert f"with alternative executor_tests/Backwards of low: {missing} low\n" in out
+    why = "its new core declares no budget_ns of adopt and take: declare it"
+    assert "with fallback executor_tests/Counter of low: while it comes in: not provable: " in out
+    assert f"  low: {why}\n" in out
+    told = json.loads(plan(text, AGAIN, "--alternatives", "--json")[1])
+    assert [(one["component"], one["core"]) for one in told["alternatives"]] == [
+        ("one", "executor_tests/HalfTimed"),
+        ("low", "executor_tests/Backwards"),
+        ("low", "executor_tests/Counter"),
+    ]
+    assert [one["after"]["outcome"] for one in told["alternatives"]][2] == "schedulable"
