@@ -100,9 +100,8 @@ class ModelLoader:
         installed = [
             path.parent.name for prefix in self._prefixes for path in prefix.glob(f"share/*/{MODEL}")
         ]
-        remedy = (
-            f"{did_you_mean(package, {*self._given, *installed})}; install it, or name its model file as well"
-        )
+        others = {*self._given, *installed} - {*self._reading}
+        remedy = f"{did_you_mean(package, others)}; install it, or name its model file as well"
         what = f"package '{package}' is not found"
         return file.problem(reference.place, what, remedy=remedy, code="unknown_package")
 

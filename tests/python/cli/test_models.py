@@ -168,6 +168,8 @@ def test_rules_and_steps_are_tried_with_a_model(model: Path, capfd: pytest.Captu
     told = capfd.readouterr().out
     assert f"{steps}: 2 steps, tried on {path}: no error found" in told
     assert f"{rules}: 1 rule, tried on {path}: no error found" in told
+    assert main(["graph", path, str(model), "--steps", str(steps)]) == 0
+    assert "StraightGuidance" in capfd.readouterr().out
 
     steps.write_text(STEPS.replace("StraightGuidance", "StraitGuidance"), encoding="utf-8")
     rules.write_text(RULES.replace("StraightGuidance", "StraitGuidance"), encoding="utf-8")
