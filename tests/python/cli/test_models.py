@@ -232,6 +232,25 @@ def test_a_model_uses_parts_of_another_one(model: Path, arm: Path, capfd: pytest
     assert (arm.parent / "build/generated/include/my_arm/model/follower_core.hpp").is_file()
 
 
+def test_a_model_uses_parts_of_an_installed_package_in_cpp(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """The shell is the installed one; the core is not written yet."""
+    model = tmp_path / "model.yaml"
+    text = ARM.replace("my_robot/GuidanceShell", "mauve_examples/ControlShell")
+    model.write_text(text.replace("2 * unit_ms", "10 ms"), encoding="utf-8")
+    examples = ROOT / "mauve_examples"
+    text = (examples / "architecture/robot.yaml").read_text(encoding="utf-8")
+    text = text.replace("core: mauve_examples/Control\n", "core: my_arm/Eager\n")
+    text = text.replace("fsm: mauve_examples/ControlFsm\n", "fsm: my_arm/FollowerFsm\n")
+    path = tmp_path / "robot.yaml"
+    path.write_text(text.replace("../maps", str(examples / "maps")), encoding="utf-8")
+    assert main(["check", str(path), str(model)]) == 0
+    assert "5 components, 12 resources, 24 connections: no error found" in capfd.readouterr().out
+    status, told = verdict(str(path), model, capfd)
+    assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
+
+
 def test_a_wrong_model_is_told_once(model: Path, arm: Path, capfd: pytest.CaptureFixture[str]) -> None:
     model.write_text(model.read_text().replace("next: W5", "next: W6"))
     assert main(["check", str(arm), str(model)]) == 2
