@@ -13,6 +13,7 @@ function(mauve_generate_types target)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   set(program "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/mauve_generate_types.py")
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/mauve_types/include")
+  _mauve_python_path(python_path)
   file(TO_CMAKE_PATH "$ENV{AMENT_PREFIX_PATH}" prefixes)
   list(TRANSFORM ARGN REPLACE "/.*" "" OUTPUT_VARIABLE packages)
   list(REMOVE_DUPLICATES packages)
@@ -24,7 +25,8 @@ function(mauve_generate_types target)
     endif()
   endforeach()
   execute_process(
-    COMMAND "${Python3_EXECUTABLE}" "${program}" --target ${target} --output "${folder}"
+    COMMAND "${CMAKE_COMMAND}" -E env "PYTHONPATH=${python_path}" PYTHONDONTWRITEBYTECODE=1
+            "${Python3_EXECUTABLE}" "${program}" --target ${target} --output "${folder}"
             --prefixes ${prefixes} ${CMAKE_PREFIX_PATH}
             ${of_this_build} --interfaces ${ARGN}
     OUTPUT_VARIABLE read ERROR_VARIABLE error RESULT_VARIABLE result OUTPUT_STRIP_TRAILING_WHITESPACE)
@@ -36,4 +38,20 @@ function(mauve_generate_types target)
   add_library(${target} INTERFACE)
   target_include_directories(${target} INTERFACE "$<BUILD_INTERFACE:${folder}>")
   target_link_libraries(${target} INTERFACE mauve_rt::kernel)
+endfunction()
+
+# Where the package mauve_rt is in Python: beside these files in its sources, else in the prefix that they are installed to.
+function(_mauve_python_path result)
+  get_filename_component(sources "${CMAKE_CURRENT_FUNCTION_LIST_DIR}" DIRECTORY)
+  if(EXISTS "${sources}/mauve_rt/modelling/__main__.py")
+    set(found "${sources}")
+  else()
+    get_filename_component(prefix "${sources}" DIRECTORY)
+    get_filename_component(prefix "${prefix}" DIRECTORY)
+    file(GLOB found "${prefix}/lib/python3*/site-packages/mauve_rt" "${prefix}/lib/python3/dist-packages/mauve_rt"
+      "${prefix}/local/lib/python3*/dist-packages/mauve_rt")
+    list(TRANSFORM found REPLACE "/mauve_rt$" "")
+  endif()
+  string(REPLACE ";" ":" found "${found};$ENV{PYTHONPATH}")
+  set(${result} "${found}" PARENT_SCOPE)
 endfunction()

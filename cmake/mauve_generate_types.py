@@ -19,6 +19,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
+from mauve_rt.modelling import keywords
+
 try:
     from rosidl_parser import definition as d
 except ImportError as error:
@@ -40,17 +42,6 @@ BASIC_TYPES = {
     "long long": "std::int64_t",
     "unsigned long long": "std::uint64_t",
 } | {f"{sign}int{bits}": f"std::{sign}int{bits}_t" for sign in ("", "u") for bits in (8, 16, 32, 64)}
-KEYWORDS = set(
-    """
-    alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
-    char32_t class co_await co_return co_yield compl concept const const_cast consteval constexpr
-    constinit continue decltype default delete do double dynamic_cast else enum explicit export extern
-    false float for friend goto if inline int long mutable namespace new noexcept not not_eq nullptr
-    operator or or_eq private protected public register reinterpret_cast requires return short signed
-    sizeof static static_assert static_cast struct switch template this thread_local throw true try
-    typedef typeid typename union unsigned using virtual void volatile wchar_t while xor xor_eq
-    """.split()  # noqa: SIM905 - a list would have a hundred lines
-)
 
 
 class Refusal(Exception):  # noqa: N818 - it is no fault of the program's
@@ -349,7 +340,7 @@ def members(message: Any) -> list[Any]:
 
 def member_name(member: Any) -> str:
     """Name the member of a field, of a C++ keyword with one character more."""
-    return f"{member.name}_" if member.name in KEYWORDS else member.name
+    return f"{member.name}_" if member.name in keywords.CPP else member.name
 
 
 def comment(annotated: Any) -> Iterator[str]:
@@ -398,7 +389,7 @@ def generate(installed: Installed, interfaces: Sequence[Interface]) -> tuple[dic
 def digest_of(words: Sequence[str], files: Sequence[Path]) -> str:
     """Digest all that headers are made of."""
     digest = hashlib.sha256("\0".join(words).encode())
-    for path in (Path(__file__), *files):
+    for path in (Path(__file__), Path(keywords.__file__), *files):
         digest.update(path.read_bytes() if path.is_file() else b"")
     return digest.hexdigest()
 

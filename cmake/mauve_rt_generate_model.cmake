@@ -10,6 +10,9 @@
 #   INTERFACES    .msg, .srv and .action files of this package besides the model's types
 #   DEPENDENCIES  packages that INTERFACES use
 #
+# Parts of another package's model, named as package/Name, are searched for where that package is installed: in
+# CMAKE_PREFIX_PATH and AMENT_PREFIX_PATH. The generated headers are installed to include/, for the packages that use this one.
+#
 # A macro, as rosidl_generate_interfaces() leaves variables for ament_package().
 macro(mauve_rt_generate_model _mauve_target)
   _mauve_write_model(${_mauve_target} ${ARGN})
@@ -57,7 +60,8 @@ function(_mauve_write_model target)
   find_package(Python3 REQUIRED COMPONENTS Interpreter)
   _mauve_python_path(python_path)
   set(folder "${CMAKE_CURRENT_BINARY_DIR}/mauve_model")
-  set(words "${model}" --package ${arg_PACKAGE} --output "${folder}")
+  file(TO_CMAKE_PATH "$ENV{AMENT_PREFIX_PATH}" prefixes)
+  set(words "${model}" --package ${arg_PACKAGE} --output "${folder}" --prefixes ${CMAKE_PREFIX_PATH} ${prefixes})
   if(target STREQUAL "PYTHON")
     list(APPEND words --python)
   endif()
@@ -71,7 +75,7 @@ function(_mauve_write_model target)
     message(WARNING "${where}:\n${error}")
   endif()
   string(REPLACE "\n" ";" printed "${printed}")
-  foreach(kind reads message interface)
+  foreach(kind reads message interface uses)
     set(${kind} ${printed})
     list(FILTER ${kind} INCLUDE REGEX "^${kind} ")
     list(TRANSFORM ${kind} REPLACE "^${kind} " "")
@@ -91,6 +95,7 @@ function(_mauve_write_model target)
     list(APPEND types ${PROJECT_NAME})
   endif()
   list(TRANSFORM message REPLACE "^(.+)$" "${folder}:msg/\\1.msg")
+  set(_mauve_used_prefixes ${uses} PARENT_SCOPE)
   set(_mauve_model "${model}" PARENT_SCOPE)
   set(_mauve_model_package ${arg_PACKAGE} PARENT_SCOPE)
   set(_mauve_generated "${folder}" PARENT_SCOPE)
@@ -100,24 +105,11 @@ function(_mauve_write_model target)
   set(_mauve_types ${types} PARENT_SCOPE)
 endfunction()
 
-# Where the package mauve_rt is in Python: beside these files in its sources, else in the prefix that they are installed to.
-function(_mauve_python_path result)
-  get_filename_component(sources "${CMAKE_CURRENT_FUNCTION_LIST_DIR}" DIRECTORY)
-  if(EXISTS "${sources}/mauve_rt/modelling/__main__.py")
-    set(found "${sources}")
-  else()
-    get_filename_component(prefix "${sources}" DIRECTORY)
-    get_filename_component(prefix "${prefix}" DIRECTORY)
-    file(GLOB found "${prefix}/lib/python3*/site-packages/mauve_rt" "${prefix}/lib/python3/dist-packages/mauve_rt"
-      "${prefix}/local/lib/python3*/dist-packages/mauve_rt")
-    list(TRANSFORM found REPLACE "/mauve_rt$" "")
-  endif()
-  string(REPLACE ";" ":" found "${found};$ENV{PYTHONPATH}")
-  set(${result} "${found}" PARENT_SCOPE)
-endfunction()
-
 function(_mauve_compile_model target)
   target_sources(${target} PRIVATE "${_mauve_generated}/src/plugins.cpp")
+  set(used ${_mauve_used_prefixes})
+  list(TRANSFORM used APPEND "/include")
+  target_include_directories(${target} SYSTEM PUBLIC "$<BUILD_INTERFACE:${used}>")
   target_include_directories(${target}
     PUBLIC "$<BUILD_INTERFACE:${_mauve_generated}/include>"
     PRIVATE "${CMAKE_CURRENT_SOURCE_DIR}/src" "${CMAKE_CURRENT_SOURCE_DIR}/include")
@@ -126,6 +118,7 @@ function(_mauve_compile_model target)
     mauve_generate_types(${target}_types ${_mauve_types})
     target_link_libraries(${target} PUBLIC ${target}_types)
   endif()
+  install(DIRECTORY "${_mauve_generated}/include/" DESTINATION include)
 endfunction()
 
 # The build imports the implementations, so that a method which is missing, or which the model no longer has, ends it.
@@ -133,11 +126,14 @@ function(_mauve_install_python_model)
   set(package ${_mauve_model_package}_parts)
   set(sources "${CMAKE_CURRENT_SOURCE_DIR}/${package}")
   file(GLOB_RECURSE modules CONFIGURE_DEPENDS "${sources}/*.py")
+  set(used ${_mauve_used_prefixes})
+  list(TRANSFORM used APPEND "/lib/python3*/site-packages")
+  file(GLOB used ${used})
   set(stamp "${_mauve_generated}/checked")
   add_custom_command(OUTPUT "${stamp}"
     COMMAND "${CMAKE_COMMAND}" -E env "PYTHONPATH=${_mauve_python_path}" PYTHONDONTWRITEBYTECODE=1
             "${Python3_EXECUTABLE}" -m mauve_rt.modelling.implementations "${_mauve_generated}/plugins.txt"
-            "${CMAKE_CURRENT_SOURCE_DIR}" "${_mauve_generated}/python"
+            "${CMAKE_CURRENT_SOURCE_DIR}" "${_mauve_generated}/python" ${used}
     COMMAND "${CMAKE_COMMAND}" -E touch "${stamp}"
     DEPENDS ${modules} "${_mauve_generated}/python/${package}/model.py" "${_mauve_generated}/plugins.txt"
     COMMENT "Checking the implementations of ${_mauve_model_package}" VERBATIM)

@@ -62,25 +62,25 @@ def _beside(machine: Machine, executor: str) -> Machine:
 
 
 def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
-    from mauve_rt.model import PluginIndex, build, load_architecture, previewed_states  # noqa: PLC0415
-    from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
+    from mauve_rt.model import build, load_architecture, previewed_states  # noqa: PLC0415
+    from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
     from mauve_rt.model.threads import thread_list, uses_of  # noqa: PLC0415
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+    from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     model = load_architecture(path, runs_here=False)
-    registry, index = PluginRegistry(), PluginIndex.installed()
-    in_python: dict[str, bool] = {}
-    for each in models:
-        found = load_model(each)
-        index = add_modelled_parts(found, registry, index)
-        in_python |= _modelled(found)
-    architecture = build(model, registry, index=index)
+    loader = ModelLoader(models)
+    found = [loader.load(each) for each in models]
+    parts = modelled_parts(found)
+    in_python = {name: is_one for each in found for name, is_one in _modelled(each).items()}
+    architecture = build(model, parts.registry, index=parts.index)
     states = previewed_states(model, architecture)
-    kinds = {resource.name: resource.kind for resource in architecture.resources()}
+    kinds = {name: resource.kind for name, resource in model.resources.items()}
     machines = [
         Machine.of(
-            part, states=states[part.name], is_python=is_python_part(part, index, in_python), kinds=kinds
+            part,
+            states=states[part.name],
+            is_python=is_python_part(part, parts.index, in_python),
+            kinds=kinds,
         )
         for part in architecture.components()
     ]
@@ -93,7 +93,7 @@ def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:
     threads = thread_list(
         model.executor, uses_of(model), components=len(model.components), has_bounds=has_bounds
     )
-    return Analyzed(machines, threads, model, registry)
+    return Analyzed(machines, threads, model, parts.registry)
 
 
 def _wait_free(part: Any, kinds: Mapping[str, str]) -> set[str]:

@@ -14,12 +14,13 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
-    from collections.abc import Iterable, Mapping
+    from collections.abc import Iterable, Mapping, Sequence
 
     from mauve_rt.errors import Problem
     from mauve_rt.model import ArchitectureModel
     from mauve_rt.model.file_kinds import FileKind
     from mauve_rt.model.remarks import Subject, Uses
+    from mauve_rt.modelling.loading import ModelLoader
     from mauve_rt.modelling.package_model import PackageModel
 
 
@@ -31,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="FILE",
         help="models, and files of an architecture, rules or steps; beside an architecture file, "
-        "steps and rules are tried on it, and models give it parts",
+        "steps and rules are tried on it, and models give it parts. Models may use parts of each other",
     )
 
 
@@ -59,14 +60,17 @@ def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
     """Check files in this order. The warnings of an architecture come when all files are read."""
     from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
     from mauve_rt.model.remarks import Uses, remarks  # noqa: PLC0415
+    from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     status, model, uses = OK, None, Uses()
+    printed: set[str] = set()  # a model that others use is wrong once
+    loader = ModelLoader(path for path, kind in kinds.items() if kind is FileKind.MODEL)
     models: list[PackageModel] = []
     subjects: list[Subject] = []
     for path, kind in kinds.items():
         try:
             if kind is FileKind.MODEL:
-                models.append(_check_model(path))
+                models.append(_check_model(path, loader))
             elif kind is FileKind.ARCHITECTURE:
                 subjects.append(_check_architecture(path, models, uses))
                 model = subjects[-1].model
@@ -75,21 +79,23 @@ def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
             else:
                 _check_steps(path, model, uses)
         except ArchitectureFileError as error:
-            status = _tell(error)
+            status = _tell(error, printed)
     for subject in subjects if status == OK else ():
         _warn(subject.model.path, remarks(subject))
     return status
 
 
-def _tell(error: ArchitectureFileError) -> int:
-    print("\n".join(error.lines()), file=sys.stderr)
+def _tell(error: ArchitectureFileError, printed: "set[str] | None" = None) -> int:
+    printed = set() if printed is None else printed
+    for line in error.lines():
+        if line not in printed:
+            print(line, file=sys.stderr)
+            printed.add(line)
     return BAD_USAGE
 
 
-def _check_model(path: Path) -> "PackageModel":
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
-
-    model = load_model(path)
+def _check_model(path: Path, loader: "ModelLoader") -> "PackageModel":
+    model = loader.load(path)
     _warn(path, model.warnings)
     content = model.content
     counts = {"shell": len(content.shells), "core": len(content.cores), "fsm": len(content.fsms)}
@@ -103,19 +109,16 @@ def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
         print(f"{path}:{warning.line}:{warning.column}: warning: {warning.text()}", file=sys.stderr)
 
 
-def _check_architecture(path: Path, models: "Iterable[PackageModel]", uses: "Uses") -> "Subject":
-    from mauve_rt._kernel import PluginRegistry  # noqa: PLC0415
+def _check_architecture(path: Path, models: "Sequence[PackageModel]", uses: "Uses") -> "Subject":
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
-    from mauve_rt.model import PluginIndex, build, configure, load_architecture  # noqa: PLC0415
-    from mauve_rt.model.modelled_parts import add_modelled_parts  # noqa: PLC0415
+    from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
+    from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
     from mauve_rt.model.remarks import Subject  # noqa: PLC0415
     from mauve_rt.supervision.drivers import late_writers  # noqa: PLC0415
 
     model = load_architecture(path)
-    registry, index = PluginRegistry(), PluginIndex.installed()
-    for each in models:
-        index = add_modelled_parts(each, registry, index)
-    architecture = build(model, registry, index=index)
+    parts = model.parts = modelled_parts(models)
+    architecture = build(model, parts.registry, index=parts.index)
     configure(model, architecture)
     subject = Subject(model, architecture, uses)
     architecture.cleanup()
@@ -129,8 +132,8 @@ def _check_architecture(path: Path, models: "Iterable[PackageModel]", uses: "Use
     found = ", ".join(counted(count, what) for what, count in counts.items())
     print(f"{path}: {found}: no error found")
     for name, resource in model.resources.items():
-        if registry.sequences(resource.type):
-            print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, registry):,} bytes")
+        if parts.registry.sequences(resource.type):
+            print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, parts.registry):,} bytes")
     return subject
 
 

@@ -1,4 +1,4 @@
-"""`mauve generate [MODEL]`: the code of a package's model, and skeletons of the algorithms that it names."""
+"""`mauve generate [MODEL [OTHER...]]`: the code of a package's model, and skeletons of its algorithms."""
 
 import argparse
 import sys
@@ -13,6 +13,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The model, and where the files go."""
     parser.add_argument(
         "model", nargs="?", type=Path, default=Path("model.yaml"), help="the model (default: model.yaml)"
+    )
+    parser.add_argument(
+        "used",
+        nargs="*",
+        type=Path,
+        metavar="OTHER",
+        help="models of other packages whose parts it uses, where they are not installed",
     )
     language = parser.add_mutually_exclusive_group()
     language.add_argument("--cpp", action="store_true", help="in C++ (default)")
@@ -34,10 +41,10 @@ def main(args: argparse.Namespace) -> int:
         write_generated,
         write_skeletons,
     )
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+    from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     try:
-        model = load_model(args.model)
+        model = ModelLoader(args.used).load(args.model)
         folder = model.path.parent
         output = args.output or folder / "build" / "generated"
         files = generated(model, is_python=args.python)

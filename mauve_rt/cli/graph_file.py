@@ -7,7 +7,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
-from mauve_rt._kernel import Architecture, PluginRegistry
+from mauve_rt._kernel import Architecture
 from mauve_rt.errors import ArchitectureFileError, ParameterError
 from mauve_rt.file_schema.words import did_you_mean
 from mauve_rt.graph.components import architecture_drawing, component_key, resource_key
@@ -15,14 +15,13 @@ from mauve_rt.graph.drawing import Drawing, Edge, Node, compared, merged
 from mauve_rt.graph.fsms import fsm_drawing
 from mauve_rt.model import (
     ArchitectureModel,
-    PluginIndex,
     build,
     configure,
     load_architecture,
     previewed_states,
 )
 from mauve_rt.model.fragment import fragment
-from mauve_rt.model.modelled_parts import add_modelled_parts
+from mauve_rt.model.modelled_parts import modelled_parts
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.model.steps import Change, Step, load_change
 from mauve_rt.modelling.package_model import PackageModel
@@ -61,6 +60,7 @@ def drawing_of_file(path: Path, models: Sequence[PackageModel], steps: Path | No
     if steps is None:
         return _drawing(path.name, model, _described(model, models)), found
     change = load_change(steps)
+    model.parts = modelled_parts(models)
     before, after = before_and_after(steps, change, model)
     more = _added_resources(model, change)
     drawn = compared(_drawing(path.name, model, before), _drawing(path.name, model, after, more))
@@ -102,10 +102,8 @@ def with_rules(drawing: Drawing, path: Path, topics: Topics) -> Drawing:
 
 
 def _built(model: ArchitectureModel, models: Sequence[PackageModel]) -> Architecture:
-    registry, index = PluginRegistry(), PluginIndex.installed()
-    for one in models:
-        index = add_modelled_parts(one, registry, index)
-    return build(model, registry, index=index)
+    parts = model.parts = modelled_parts(models)
+    return build(model, parts.registry, index=parts.index)
 
 
 def _described(model: ArchitectureModel, models: Sequence[PackageModel]) -> Described:

@@ -2,27 +2,33 @@
 
 from collections.abc import Iterator
 
-from mauve_rt._kernel import PluginRegistry
 from mauve_rt.cli.graph_file import require
 from mauve_rt.graph.drawing import Drawing, Edge, Node
 from mauve_rt.graph.fsms import fsm_drawing
-from mauve_rt.model import PluginIndex
-from mauve_rt.model.modelled_parts import add_modelled_parts
+from mauve_rt.model.modelled_parts import modelled_parts
 from mauve_rt.modelling.package_model import PackageModel
-from mauve_rt.modelling.schema import CoreModel, FsmModel, PortModel, ShellModel
+from mauve_rt.modelling.schema import CoreModel, FsmModel, ModelFile, PortModel, ShellModel
+from mauve_rt.modelling.scope import Scope
 
 
 def drawing_of_model(model: PackageModel) -> Drawing:
     """The parts of a model: an arrow says which part uses which."""
     content = model.content
+    shells, cores = _with_used(content, model.scope)
     nodes = [
-        *(_shell(name, one) for name, one in content.shells.items()),
-        *(_core(name, one) for name, one in content.cores.items()),
+        *(_shell(name, one) for name, one in shells.items()),
+        *(_core(name, one) for name, one in cores.items()),
         *(_fsm(name, one) for name, one in content.fsms.items()),
     ]
-    edges = [_uses("core", name, "shell", one.shell) for name, one in content.cores.items()]
+    edges = [_uses("core", name, "shell", one.shell) for name, one in cores.items()]
     edges += [_uses("fsm", name, "core", one.core) for name, one in content.fsms.items()]
     return Drawing(title=f"model of {content.package}", nodes=tuple(nodes), edges=tuple(edges))
+
+
+def _with_used(content: ModelFile, scope: Scope) -> tuple[dict[str, ShellModel], dict[str, CoreModel]]:
+    """Own shells and cores, and those of other models that own cores and fsms use."""
+    cores = content.cores | {fsm.core: scope.cores[fsm.core] for fsm in content.fsms.values()}
+    return content.shells | {one.shell: scope.shells[one.shell] for one in cores.values()}, cores
 
 
 def fsm_of_model(model: PackageModel, name: str) -> Drawing:
@@ -32,8 +38,7 @@ def fsm_of_model(model: PackageModel, name: str) -> Drawing:
         ParameterError: there is no such fsm.
     """
     require(name, model.content.fsms, f"{model.path}: fsm")
-    registry = PluginRegistry()
-    add_modelled_parts(model, registry, PluginIndex.installed())
+    registry = modelled_parts([*model.closure(), model]).registry
     registered = model.registered(name)
     return fsm_drawing(registered, registry.describe_fsm(registered))
 

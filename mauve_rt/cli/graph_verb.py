@@ -28,7 +28,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="+",
         metavar="FILE|NODE|BAG|MODEL",
         help="an architecture file, the node of an executor, a bag, or the model of a package. Rules files "
-        "add their rules; models beside an architecture file give it parts that are not installed",
+        "add their rules; models beside an architecture file give it parts that are not installed. "
+        "Of several models the first one is drawn; the others have parts that it uses",
     )
     completed_by(subjects, complete_executors_and_files)
     component = parser.add_argument(
@@ -123,18 +124,18 @@ def _of_files(kinds: "Kinds", args: argparse.Namespace) -> "tuple[Drawing, Any]"
     from mauve_rt.cli.graph_file import Topics, drawing_of_file, fsm_of_file  # noqa: PLC0415
     from mauve_rt.cli.graph_model import drawing_of_model, fsm_of_model  # noqa: PLC0415
     from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
-    from mauve_rt.modelling.package_model import load_model  # noqa: PLC0415
+    from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
-    models = [load_model(path) for path, kind in kinds.items() if kind is FileKind.MODEL]
+    paths = [path for path, kind in kinds.items() if kind is FileKind.MODEL]
+    loader = ModelLoader(paths)
+    models = [loader.load(path) for path in paths]
     for path, kind in kinds.items():
         if kind is FileKind.ARCHITECTURE:
             if args.fsm:
                 return fsm_of_file(path, args.fsm, models), None
             return drawing_of_file(path, models, args.steps)
-    if len(models) != 1 or len(kinds) != 1:
-        raise ParameterError(
-            "graph: expected an architecture file, a node or a bag beside rules; or one model"
-        )
+    if not models or len(models) != len(kinds):
+        raise ParameterError("graph: expected an architecture file, a node or a bag beside rules; or models")
     none = Topics("/", {})
     return (fsm_of_model(models[0], args.fsm) if args.fsm else drawing_of_model(models[0])), none
 

@@ -6,9 +6,13 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.verb import OK
+from mauve_rt.errors import ParameterError
+
+if TYPE_CHECKING:
+    from mauve_rt.modelling.package_model import PackageModel
 
 
 @dataclass(frozen=True)
@@ -54,8 +58,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                 "--for",
                 dest="base",
                 default="",
-                metavar="SHELL",
-                help="shell, or another core, that it is for (default: the only one of the package)",
+                metavar="SHELL|CORE",
+                help="shell, or another core, that it is for; also a core of the package's model, whose "
+                "actions and guards it has (default: the only one of the package)",
             )
 
 
@@ -103,10 +108,14 @@ def _write_part(args: argparse.Namespace) -> Iterator[Path]:
     from mauve_rt.scaffold.package import find_package  # noqa: PLC0415
     from mauve_rt.scaffold.rendering import render, write_parts  # noqa: PLC0415
     from mauve_rt.scaffold.schemas import write_schemas  # noqa: PLC0415
-    from mauve_rt.scaffold.sources import base_of, target_of  # noqa: PLC0415
+    from mauve_rt.scaffold.sources import base_of, modelled_core, target_of  # noqa: PLC0415
 
     name, file = part_names(args.name)
     package = find_package(args.folder)
+    if args.kind == "core" and (found := modelled_core(package.folder, args.base)) is not None:
+        yield from _write_modelled_core(package.folder, *found, name, in_python=args.python)
+        write_schemas(package.folder)
+        return
     values: dict[str, Any] = {"package": package.name, "name": name, "file": file}
     if args.kind == "core":
         values["base"] = base_of(package.folder, package.name, args.base, in_python=args.python)
@@ -117,3 +126,21 @@ def _write_part(args: argparse.Namespace) -> Iterator[Path]:
         template += "_python" if args.python else "_cpp"
     yield from (package.folder / path for path in write_parts(package.folder, render(template, values)))
     write_schemas(package.folder)
+
+
+def _write_modelled_core(
+    folder: Path, model: "PackageModel", core: str, name: str, *, in_python: bool
+) -> Iterator[Path]:
+    """An implementation of a model's core. The model registers it."""
+    from mauve_rt.modelling.generate import skeleton  # noqa: PLC0415
+    from mauve_rt.scaffold.rendering import write_parts  # noqa: PLC0415
+
+    files = skeleton(model, core, name, is_python=in_python)
+    if not files:
+        raise ParameterError(f"core: {model.path} says where {name} is written. Choose another name.")
+    yield from (folder / path for path in write_parts(folder, {Path(each): files[each] for each in files}))
+    if name not in model.content.cores[core].implementations:
+        print(f"next: add `{name}: {{}}` to cores.{core}.implementations in {model.path}", file=sys.stderr)
+    if not in_python:
+        sources = [each for each in files if each.startswith("src/") and each.endswith(".cpp")]
+        print(f"next: add {sources[0]} to add_library() in {folder / 'CMakeLists.txt'}", file=sys.stderr)

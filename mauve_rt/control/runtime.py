@@ -124,6 +124,8 @@ class Runtime:
             return
         model = self.model
         self.index = PluginIndex.installed()
+        if model.parts is not None:
+            self.registry, self.index = model.parts.registry, model.parts.index
         with self._loading:
             architecture = build(model, self.registry, index=self.index)
         configure(model, architecture)

@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.file_schema.schema_errors import owner, read_content
@@ -12,6 +13,9 @@ from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
 from mauve_rt.model.schema import ComponentModel, FileModel, PropertyValue, ResourceModel
 from mauve_rt.model.substitution import substituted_property
+
+if TYPE_CHECKING:
+    from mauve_rt.model.modelled_parts import ModelledParts
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,6 +56,7 @@ class ArchitectureModel:
             )
             for index, (port, service) in enumerate(content.connections)
         ]
+        self.parts: ModelledParts | None = None  # where not all parts are installed
         self._overridden = dict(overrides.properties)
 
     def problem(self, location: Location, what: str, **facts: str) -> Problem:

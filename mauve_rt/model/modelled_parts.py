@@ -4,7 +4,9 @@ The kernel runs what is generated from the model in Python; actions do nothing, 
 drawings and the timing analysis of a model take what the generated code will be, not a second picture of it.
 """
 
-from types import ModuleType
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 from mauve_rt._kernel import PluginRegistry
@@ -15,14 +17,51 @@ from mauve_rt.modelling.package_model import PackageModel
 from mauve_rt.modelling.python import own_types, parts_module
 from mauve_rt.modelling.schema import CoreModel, CppCall, ParameterModel, ResourceModel
 from mauve_rt.parts import resources
+from mauve_rt.parts.cores import Core, Shell
 from mauve_rt.parts.message_types import promise
 
 
-def add_modelled_parts(model: PackageModel, registry: PluginRegistry, index: PluginIndex) -> PluginIndex:
-    """Register the parts of a model in the place of installed ones; returns the index of all others."""
-    promise(own_types(model))
+@dataclass(frozen=True)
+class ModelledParts:
+    """Parts of models in a registry, and the index of those that are installed."""
+
+    registry: PluginRegistry
+    index: PluginIndex
+
+
+def modelled_parts(models: Sequence[PackageModel]) -> ModelledParts:
+    """The parts of models in the place of installed ones.
+
+    Parts of models that these use, and that are not among them, are the installed ones.
+    """
+    registry, index = PluginRegistry(), PluginIndex.installed()
+    given = {model.package for model in models}
+    modules: dict[str, object] = {}
+    for model in _used_first(models):
+        promise(own_types(model))
+        if model.package in given:
+            modules[model.package] = _add(model, modules, registry)
+            index = index.without(model.package)
+        else:
+            modules[model.package] = _bases(model)
+    return ModelledParts(registry, index)
+
+
+def _used_first(models: Sequence[PackageModel]) -> Iterable[PackageModel]:
+    return {one.package: one for model in models for one in (*model.closure(), model)}.values()
+
+
+def _bases(model: PackageModel) -> object:
+    """What parts of an installed package are, in C++ or in Python."""
+    shells = dict.fromkeys(model.content.shells, Shell)
+    return SimpleNamespace(**shells, **{abstract_class(name): Core for name in model.content.cores})
+
+
+def _add(model: PackageModel, used: Mapping[str, object], registry: PluginRegistry) -> object:
+    """Register the parts of a model; returns its module, for models that use it."""
     module = ModuleType(f"{parts_module(model.package)}.model")
-    exec(python_module(model), vars(module))  # noqa: S102 - its names were checked
+    vars(module).update({parts_module(one): SimpleNamespace(model=part) for one, part in used.items()})
+    exec(python_module(model, has_imports=False), vars(module))  # noqa: S102 - its names were checked
     for name in model.content.shells:
         registry.shell(model.registered(name), getattr(module, name))
     for name, core in model.content.cores.items():
@@ -34,7 +73,7 @@ def add_modelled_parts(model: PackageModel, registry: PluginRegistry, index: Plu
         registry.fsm(model.registered(name), getattr(module, name), model.registered(shell))
     for name, resource in model.content.resources.items():
         registry.resource(model.registered(name), _resource(name, resource))
-    return index.without(model.package)
+    return module
 
 
 def _without_algorithm(name: str, core: CoreModel, abstract: type[Any]) -> type[Any]:

@@ -296,7 +296,12 @@ class PluginLoader:
         """`package 'my_arm' is not found`, of `my_arm/Arm`; empty: there is one of that or a similar name."""
         package, separator, _ = name.partition("/")
         packages = {found for found, _, _ in ament_index.resources("packages")}
-        packages |= {plugin.name.partition("/")[0] for plugin in self.index}
+        known = (
+            [plugin.name for plugin in self.index]
+            + self.registry.names("core")
+            + self.registry.names("shell")
+        )
+        packages |= {each.partition("/")[0] for each in known}
         if not separator or nearest(package, packages, likeness=0.8):
             return ""
         return f"package {shown(package)} is not found"

@@ -58,6 +58,7 @@ class _Reading:
         self._registry = loader.registry
         self._model = RegisteredModel({})
         self._types: Mapped = {}
+        self._packages = {name.partition("/")[0] for name in loader.names("shell")}
 
     def result(self) -> RegisteredModel:
         names = {
@@ -117,7 +118,8 @@ class _Reading:
         item = item.removeprefix("msg/")
         return item if package == self._package else f"{package}/msg/{item}"
 
-    def _type_name(self, name: str) -> str:
+    def _own(self, name: str) -> str:
+        """A name without the package, of another package with it."""
         return _last(name) if name.partition("/")[0] == self._package else name
 
     def _shell(self, name: str) -> Mapped:
@@ -134,7 +136,7 @@ class _Reading:
             return {"call": self._call(port.type, f"port {_last(shell)}.{port.name}")}
         policies = {"on_commit": port.on_commit, "on_stop": port.on_stop} if port.kind == "write" else {}
         given = {key: policy for key, policy in policies.items() if policy != _DEFAULT_POLICIES[key]}
-        return {port.kind: self._type_name(port.type), **given, **optional}
+        return {port.kind: self._own(port.type), **given, **optional}
 
     def _call(self, type_name: str, of: str) -> str | Mapped:
         if "/srv/" in type_name:
@@ -147,19 +149,23 @@ class _Reading:
         }
 
     def _fsm(self, name: str, core_names: Iterable[str], cores: Mapped) -> Mapped:
+        shell = self._registry.fsm_shell(name)
+        self._loader.require("shell", shell)  # it may be of another package
         states = {state.name: state for state in self._registry.describe_fsm(name)}
         abstract, methods = self._core_of(name)
-        shell = self._registry.fsm_shell(name)
-        core = _core_name(abstract, shell)
-        known = cores.setdefault(core, {"shell": _last(shell), "actions": [], "guards": []})
-        for kind in ("actions", "guards"):
-            _add(known[kind], methods.get(kind, ()))
-        for state in states.values():
-            _add(known["actions"], [state.action] if state.action else [])
-            _add(known["guards"], state.guards)
-        suited = [each for each in core_names if self._suits(each, shell, abstract)]
-        known |= self._facts_of(suited)
-        cores[core] = known
+        package, _, class_name = abstract.rpartition("/")
+        core = _core_name(class_name, shell)
+        if package != self._package and package in self._packages:
+            core = f"{package}/{core}"  # of another package's model
+        else:
+            known = cores.setdefault(core, {"shell": self._own(shell), "actions": [], "guards": []})
+            for kind in ("actions", "guards"):
+                _add(known[kind], methods.get(kind, ()))
+            for state in states.values():
+                _add(known["actions"], [state.action] if state.action else [])
+                _add(known["guards"], state.guards)
+            suited = [each for each in core_names if self._suits(each, shell, class_name)]
+            known |= self._facts_of(suited)
         initial = next(state.name for state in states.values() if state.is_initial)
         periodic = _period(states)
         shown = {
@@ -171,18 +177,19 @@ class _Reading:
         return {key: value for key, value in head.items() if value is not None} | {"states": shown}
 
     def _core_of(self, fsm: str) -> tuple[str, Mapping[str, list[str]]]:
-        """The class whose methods an fsm calls, empty: not known; and the methods that it says it has."""
+        """`package/Class` whose methods an fsm calls, empty: not known; and the methods that it has."""
         part = self._loader.python_class("fsm", fsm)
         if part is None:
             classes = self._registry.classes_of("fsm", fsm)
-            return (_class_name(classes[0]) if classes else ""), {}
+            return ("/".join(_class_names(classes[0])[-2:]) if classes else ""), {}
         for base in getattr(part, "__orig_bases__", ()):
             for found in get_args(base)[1:2]:
                 is_modelled = isinstance(found, type) and issubclass(found, ModelCore)
                 methods = (
                     {"actions": list(found.actions), "guards": list(found.guards)} if is_modelled else {}
                 )
-                return getattr(found, "__name__", ""), methods
+                name = getattr(found, "__name__", "")
+                return (f"{_package_of(found)}/{name}" if is_modelled else name), methods
         return "", {}
 
     def _suits(self, core: str, shell: str, abstract: str) -> bool:
@@ -195,7 +202,7 @@ class _Reading:
                 or any(base.__name__ == abstract for base in part.__mro__)
                 or not issubclass(part, Configurable)
             )
-        classes = [_class_name(each) for each in self._registry.classes_of("core", core)]
+        classes = [_class_names(each)[-1] for each in self._registry.classes_of("core", core)]
         return not abstract or abstract in classes
 
     def _facts_of(self, cores: Iterable[str]) -> Mapped:
@@ -240,13 +247,19 @@ def _last(name: str) -> str:
     return name.rpartition("/")[2]
 
 
-def _class_name(mangled: str) -> str:
-    """The last name of a class in the compiler's words, such as N8my_robot12GuidanceCoreE."""
-    rest, name = mangled.removeprefix("N"), mangled
+def _class_names(mangled: str) -> list[str]:
+    """Namespaces and name of a class in the compiler's words, such as N8my_robot12GuidanceCoreE."""
+    rest, names = mangled.removeprefix("N"), []
     while found := re.match(r"\d+", rest):
         length = int(found[0])
-        name, rest = rest[found.end() : found.end() + length], rest[found.end() + length :]
-    return name
+        names.append(rest[found.end() : found.end() + length])
+        rest = rest[found.end() + length :]
+    return names or [mangled]
+
+
+def _package_of(abstract: type) -> str:
+    """The package of a generated class in Python."""
+    return abstract.__module__.partition(".")[0].removesuffix("_parts")
 
 
 def _core_name(abstract: str, shell: str) -> str:

@@ -5,7 +5,10 @@ from typing import Any
 from mauve_rt._kernel import PluginRegistry, ResourceDescription
 from mauve_rt.model.resource_kinds import has_key
 from mauve_rt.model.schema import ResourceModel
-from mauve_rt.parts.message_types import is_message
+from mauve_rt.parts.message_types import is_message, is_promised
+
+_IN_PLACE, _STAND_IN = "latest_value", "shared_data"
+"""The kind that needs a struct in C++, and the one that checks take where a model only promises it."""
 
 
 def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str, Any]:
@@ -18,6 +21,9 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
     can_be_serialized = has_key(registry.resource_kind(kind), "max_bytes")
     if can_be_serialized and name not in registry.names("type") and is_message(name):
         return {"resource": DataOfKind(kind, name, **parameters)}
+    if kind == _IN_PLACE and name not in registry.names("type") and is_promised(name):
+        # Before the struct is generated: the same services. The file was checked for its limits.
+        return {"resource": DataOfKind(_STAND_IN, name)}
     return {"kind": kind, "type": name, **parameters}
 
 

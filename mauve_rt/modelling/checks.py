@@ -11,6 +11,7 @@ from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.modelling.durations import NS_OF, Duration
 from mauve_rt.modelling.keywords import languages_of_keyword
 from mauve_rt.modelling.schema import CoreModel, CppType, FsmModel, ModelFile, ShellModel, StateModel
+from mauve_rt.modelling.scope import Scope
 from mauve_rt.modelling.type_names import NUMBERS, TypeName
 
 _RESERVED_OF_SHELLS = frozenset(
@@ -29,9 +30,9 @@ _RESERVED = frozenset(
 """Methods of every core: no action or guard has one of these names."""
 
 
-def problems(file: YamlFile, content: ModelFile) -> Iterator[Problem]:
-    """Everything that is wrong."""
-    checks = _Checks(file, content)
+def problems(file: YamlFile, content: ModelFile, scope: Scope) -> Iterator[Problem]:
+    """Everything that is wrong, but for names that another model lacks."""
+    checks = _Checks(file, content, scope)
     yield from checks.names()
     yield from checks.types()
     for name, shell in content.shells.items():
@@ -45,13 +46,13 @@ def problems(file: YamlFile, content: ModelFile) -> Iterator[Problem]:
 def warnings(file: YamlFile, content: ModelFile) -> Iterator[Problem]:
     """What is right, but has no effect."""
     used = {core.shell for core in content.cores.values()}
-    for name in content.shells:
+    for name in content.shells if content.cores else ():  # without cores, they are for other packages
         if name not in used:
             yield file.key_problem(
                 ("shells", name), f"no core uses shell '{name}'", remedy="remove it, or write a core for it"
             )
     run = {fsm.core for fsm in content.fsms.values()}
-    for name in content.cores:
+    for name in content.cores if content.fsms else ():
         if name not in run:
             yield file.key_problem(
                 ("cores", name), f"no fsm calls core '{name}'", remedy="remove it, or write an fsm for it"
@@ -59,13 +60,14 @@ def warnings(file: YamlFile, content: ModelFile) -> Iterator[Problem]:
 
 
 def abstract_class(core: str) -> str:
-    """The class whose methods an fsm calls, and from which implementations derive."""
+    """The class whose methods an fsm calls, and from which implementations derive; also of `package/Name`."""
     return f"{core}Core"
 
 
 class _Checks:
-    def __init__(self, file: YamlFile, content: ModelFile) -> None:
+    def __init__(self, file: YamlFile, content: ModelFile, scope: Scope) -> None:
         self._file = file
+        self._scope = scope
         self._content = content
         self._no_lengths: set[tuple[int, str]] = set()  # properties of shells that were named once
 
@@ -106,6 +108,10 @@ class _Checks:
             for field, of in own.items():
                 yield from self._keyword(("types", name, field), field)
                 yield from self._type(("types", name, field), of, is_port=False)
+                if isinstance(existing := self._scope.types.get(of.item), CppType):
+                    what = f"a message has no field of '{of.item}', a struct that exists in C++"
+                    remedy = f"write {existing.name}" if "/msg/" in existing.name else "name its fields here"
+                    yield self._file.problem(("types", name, field), what, remedy=remedy)
             if name in self._within(name):
                 what = f"type '{name}' is within itself"
                 yield self._file.key_problem(("types", name), what, remedy="break the cycle")
@@ -123,9 +129,9 @@ class _Checks:
         return found
 
     def _type(self, place: Location, of: TypeName, *, is_port: bool) -> Iterator[Problem]:
-        known = self._content.types
+        known = self._scope.types
         numbers = () if is_port else (*NUMBERS, "string")
-        if of.item not in (*known, *numbers) and "/msg/" not in of.item:
+        if of.item not in (*known, *numbers) and "/" not in of.item:
             remedy = did_you_mean(of.item, [*known, *numbers])
             what = f"unknown type '{of.item}'"
             expected = "a type of the model, or a message such as geometry_msgs/msg/Point"
@@ -166,8 +172,8 @@ class _Checks:
 
     def core(self, place: Location, core: CoreModel) -> Iterator[Problem]:
         """Its shell, its methods, its state and what its implementations say of them."""
-        if core.shell not in self._content.shells:
-            yield self._unknown((*place, "shell"), "shell", core.shell, self._content.shells)
+        if core.shell not in self._scope.shells and "/" not in core.shell:
+            yield self._unknown((*place, "shell"), "shell", core.shell, self._scope.shells)
         seen: dict[str, str] = {}
         for kind, names in (("actions", core.actions), ("guards", core.guards), ("state", core.state)):
             for key, name in _entries(names):
@@ -204,10 +210,10 @@ class _Checks:
 
     def fsm(self, place: Location, fsm: FsmModel) -> Iterator[Problem]:
         """Its core, its states and where they lead."""
-        core = self._content.cores.get(fsm.core)
-        if core is None:
-            yield self._unknown((*place, "core"), "core", fsm.core, self._content.cores)
-        shell = self._content.shells.get(core.shell) if core is not None else None
+        core = self._scope.cores.get(fsm.core)
+        if core is None and "/" not in fsm.core:
+            yield self._unknown((*place, "core"), "core", fsm.core, self._scope.cores)
+        shell = self._scope.shells.get(core.shell) if core is not None else None
         if fsm.initial not in fsm.states:
             yield self._unknown((*place, "initial"), "state", fsm.initial, fsm.states)
         if fsm.periodic is not None:

@@ -44,20 +44,32 @@ class CppNames:
     def _item(self, of: TypeName) -> str:
         if of.item == "string":
             return f"mauve::BoundedString<{of.length}>"
-        own = self._model.content.types.get(of.item)
-        if own is None:
-            return f"mauve::msg::{of.item.replace('/msg/', '::')}"
-        return own.cpp if isinstance(own, CppType) else of.item
+        known = self._model.scope.types.get(of.item)
+        if isinstance(known, CppType):
+            return known.cpp
+        if known is not None and not of.is_of_model:
+            return of.item
+        return f"mauve::msg::{self._model.registered_type(of.item).replace('/msg/', '::')}"
 
     def header(self, of: TypeName) -> Iterator[str]:
         """The header of a type; none of a number or text."""
-        own = self._model.content.types.get(of.item)
-        if isinstance(own, CppType):
-            yield own.include
-        elif own is not None:
+        known = self._model.scope.types.get(of.item)
+        if isinstance(known, CppType):
+            yield known.include
+        elif known is not None and not of.is_of_model:
             yield f"{self._model.package}/model/types.hpp"
         elif of.item != "string" and of.item not in NUMBERS:
-            yield interface_header(of.item)
+            yield interface_header(self._model.registered_type(of.item))
+
+    def part(self, name: str) -> str:
+        """The class of a shell or of an abstract core."""
+        return f"::{name.replace('/', '::')}" if "/" in name else name
+
+    def part_header(self, name: str) -> str:
+        """The generated header of a shell or of an abstract core, as it is included."""
+        package, _, own = self._model.registered(name).partition("/")
+        path = f"{package}/model/{snake(own)}.hpp"
+        return f"<{path}>" if "/" in name else f'"{path}"'
 
     def port(self, name: str, port: PortModel) -> str:
         """The declaration of a port."""

@@ -1,8 +1,8 @@
-"""Words that are no names in C++ or in Python."""
+"""Words that are no names in C++ or in Python: also for CMake's mauve_generate_types()."""
 
 import keyword
 
-_CPP = frozenset(
+CPP = frozenset(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char8_t char16_t
     char32_t class co_await co_return co_yield compl concept const const_cast consteval constexpr
@@ -17,5 +17,5 @@ _CPP = frozenset(
 
 def languages_of_keyword(name: str) -> list[str]:
     """The languages, C++ and Python, in which a word is no name."""
-    is_one = {"C++": name in _CPP, "Python": keyword.iskeyword(name)}
+    is_one = {"C++": name in CPP, "Python": keyword.iskeyword(name)}
     return [language for language, found in is_one.items() if found]

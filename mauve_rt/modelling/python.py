@@ -11,13 +11,18 @@ from mauve_rt.modelling.schema import CoreModel, CppCall, PortModel, PropertyMod
 from mauve_rt.modelling.type_names import NUMBERS
 
 
-def module(model: PackageModel, render: Callable[..., str]) -> str:
-    """The module with shells, abstract cores and fsms."""
+def module(model: PackageModel, render: Callable[..., str], *, has_imports: bool = True) -> str:
+    """The module with shells, abstract cores and fsms.
+
+    Without imports it takes `other_parts` of a package `other` that it uses from its globals.
+    """
     return render(
         model,
         "python/model.py",
         model=model,
+        imports=[f"{parts_module(each)}.model" for each in _packages_of_parts(model)] if has_imports else [],
         abstract=abstract_class,
+        part=_part,
         port=lambda one: _port(model, one),
         property_call=_property,
         duration=_duration,
@@ -25,6 +30,19 @@ def module(model: PackageModel, render: Callable[..., str]) -> str:
         wcet=wcet,
         docstring=docstring,
     )
+
+
+def _packages_of_parts(model: PackageModel) -> list[str]:
+    """Of shells and cores that the model's own cores and fsms name."""
+    cores = [*model.content.cores.values(), *map(model.core_of, model.content.fsms.values())]
+    names = [*(core.shell for core in cores), *(fsm.core for fsm in model.content.fsms.values())]
+    return sorted({name.partition("/")[0] for name in names if "/" in name})
+
+
+def _part(name: str) -> str:
+    """The class of a shell or of an abstract core."""
+    package, separator, own = name.rpartition("/")
+    return f"{parts_module(package)}.model.{own}" if separator else own
 
 
 def docstring(value: str) -> str:
@@ -50,12 +68,12 @@ def _lines(model: PackageModel) -> Iterator[str]:
     for core in content.cores.values():
         for name, one in core.implementations.items():
             target = one.module or f"{parts_module(package)}.{snake(name)}"
-            yield f"core; {package}/{name}; {package}/{core.shell}; {target}:{name}"
+            yield f"core; {package}/{name}; {model.registered(core.shell)}; {target}:{name}"
     for name, resource in content.resources.items():
         target = resource.module or f"{parts_module(package)}.{snake(name)}"
         yield f"resource; {package}/{name}; ; {target}:{name}"
     for name, fsm in content.fsms.items():
-        shell = f"{package}/{model.core_of(fsm).shell}"
+        shell = model.registered(model.core_of(fsm).shell)
         yield f"fsm; {package}/{name}; {shell}; {parts_module(package)}.model:{name}"
 
 

@@ -39,6 +39,7 @@ from mauve_rt.modelling.type_names import TypeName
 _NAME = r"[A-Za-z]\w{0,99}"  # the kernel's rule for all names
 _NAME_WORDS = "a name of letters, digits and single underscores that starts with a letter"
 NAME = Text(_NAME, _NAME_WORDS, without="__")
+_PART = Text(rf"(?:[a-z]\w*/)?{_NAME}", "a name, or package/Name of another package's model", without="__")
 _PACKAGE = Text(r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*", "small letters, digits and single underscores")
 _FIELD = Text(
     r"[a-z][a-z0-9]*(?:_[a-z0-9]+)*", "a field's name of .msg files: small letters, digits, underscores"
@@ -109,6 +110,10 @@ class CppType(Section):
     cpp: str = setting(_CPP, "the struct")
     include: str = setting(_HEADER, "its header")
     name: str = setting(_REGISTERED, "the name by which it is registered")
+
+
+TypeModel = Mapping[str, TypeName] | CppType
+"""A type of a model."""
 
 
 class _Type(Kind):
@@ -285,7 +290,7 @@ class ImplementationModel(Section):
 class CoreModel(Section):
     """What an fsm may call, and the algorithms that do it."""
 
-    shell: str = setting(NAME, "the shell that it uses")
+    shell: str = setting(_PART, "the shell that it uses, also package/Name")
     description: str = setting(_LINE, "what it is", default="")
     actions: list[str] = setting(ListOf(NAME, few=1), "methods that execution states call")
     guards: list[str] = setting(ListOf(NAME), "methods that transitions ask, bool and const", default=[])
@@ -382,7 +387,7 @@ class StateModel(Section):
 class FsmModel(Section):
     """A machine of states."""
 
-    core: str = setting(NAME, "the core whose methods it calls")
+    core: str = setting(_PART, "the core whose methods it calls, also package/Name")
     description: str = setting(_LINE, "what it is", default="")
     periodic: Duration | None = setting(
         _TIME, "the period of a machine that executes one state in each", default=None
@@ -439,7 +444,7 @@ class ModelFile(Section):
         Choice(1), "version of the schema", hint="this program reads version 1 of the schema"
     )
     package: str = setting(_PACKAGE, "the package whose parts these are")
-    types: dict[str, Mapping[str, TypeName] | CppType] = setting(
+    types: dict[str, TypeModel] = setting(
         TableOf(_Type(), names=Text(r"[A-Z][A-Za-z0-9]*", "a message's name such as Point2D")),
         "structs, which become messages of the package; or structs that exist in C++",
         default={},

@@ -12,7 +12,8 @@ NUMBERS = {
 """Numbers of .msg files, and what they are in C++."""
 
 EXPECTED = (
-    "a number such as float64, string<=32, a type of the model, package/msg/Name; a list as float64[<=3]"
+    "a number such as float64, string<=32, a type of the model, package/Name of another model, "
+    "package/msg/Name; a list as float64[<=3]"
 )
 PATTERN = (
     r" *(?:string *<= *(?P<text>\d+)|(?P<item>[A-Za-z]\w*(?:/\w+){0,2}))"
@@ -27,7 +28,7 @@ class TypeName:
 
     Attributes:
         text: as the model has it, without spaces.
-        item: a number, `string`, a type of the model, or package/msg/Name.
+        item: a number, `string`, a type of the model, package/Name of another model, or package/msg/Name.
         length: the most characters of a string; None: no string, or one without a bound.
         count: the elements of a list; None: it is no list, or has no bound.
         is_list: whether it is one.
@@ -41,6 +42,11 @@ class TypeName:
     count: int | None
     is_list: bool
     is_fixed: bool
+
+    @property
+    def is_of_model(self) -> bool:
+        """Whether it is package/Name: a type of another package's model."""
+        return self.item.count("/") == 1
 
     @property
     def is_bounded(self) -> bool:

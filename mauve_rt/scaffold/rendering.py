@@ -9,9 +9,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from jinja2 import Environment, StrictUndefined
-
 from mauve_rt.errors import ParameterError
+from mauve_rt.modelling.source_templates import environment
 
 _TEMPLATES = Path(__file__).with_name("templates")
 _KEPT = "__init__.py"  # parts share it: it is written where there is none
@@ -19,16 +18,13 @@ _KEPT = "__init__.py"  # parts share it: it is written where there is none
 
 def render(kind: str, values: Mapping[str, Any]) -> dict[Path, str]:
     """The files of a kind of template, by their paths below the package."""
-    # Source code is no HTML: nothing is escaped.
-    environment = Environment(  # noqa: S701
-        undefined=StrictUndefined, keep_trailing_newline=True, trim_blocks=True, lstrip_blocks=True
-    )
     folder = _TEMPLATES / kind
+    templates = environment(folder)
     return {
-        Path(
-            environment.from_string(str(file.relative_to(folder).with_suffix(""))).render(values)
-        ): environment.from_string(file.read_text(encoding="utf-8")).render(values)
-        for file in sorted(folder.rglob("*.j2"))
+        Path(templates.from_string(name.removesuffix(".j2")).render(values)): templates.get_template(
+            name
+        ).render(values)
+        for name in templates.list_templates(extensions=["j2"])
     }
 
 

@@ -9,8 +9,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, ParameterError
+from mauve_rt.file_schema.words import did_you_mean
 from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.file_kinds import FileKind, file_kind
+from mauve_rt.modelling.checks import abstract_class
+from mauve_rt.modelling.loading import MODEL, load_model
+from mauve_rt.modelling.package_model import PackageModel
 
 _CPP_SHELL = re.compile(
     r"\b(?:struct|class)\s+(\w+)\s*(?:final\s*)?:\s*(?:public\s+)?[\w:]*Shell\b[^{]*\{(.*?)^\};",
@@ -120,6 +124,37 @@ def base_of(package: Path, name: str, wanted: str, *, in_python: bool) -> Base:
     if in_python and not base.is_python:
         base = replace(base, parent="Core")  # a class in Python cannot derive from one in C++
     return base
+
+
+def modelled_core(package: Path, wanted: str) -> tuple[PackageModel, str] | None:
+    """The model of a package, and its core that `wanted` names: as a core, a class, a shell or an algorithm.
+
+    None: the package has no model, or cores that are written by hand are meant.
+
+    Raises:
+        ParameterError: the model has no such core, or several.
+        ArchitectureFileError: the model is wrong.
+    """
+    if not (package / MODEL).is_file():
+        return None
+    model = load_model(package)
+    names = {
+        name: {name, abstract_class(name), core.shell.rpartition("/")[2], *core.implementations}
+        for name, core in model.content.cores.items()
+    }
+    last = wanted.rpartition("/")[2]
+    found = [name for name, known in names.items() if not wanted or last in known]
+    if len(found) == 1:
+        return model, found[0]
+    by_hand = [*_cpp_cores(package), *_python_cores(package, model.package)]
+    if not found and by_hand:
+        return None
+    if wanted and not found:
+        remedy = did_you_mean(last, [each for known in names.values() for each in known])
+        raise ParameterError(f"--for {wanted}: {model.path} has no such core, shell or algorithm; {remedy}")
+    raise ParameterError(
+        f"core: expected one core in {model.path}, found {_list(found)}. Choose one with --for CORE."
+    )
 
 
 def cpp_base(core: str, shell: str, file: str, ports: tuple[Port, ...], *, is_final: bool = False) -> Base:

@@ -24,7 +24,8 @@ def all_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Probl
 
 def standing_findings(file: RulesFile, model: ArchitectureModel | None) -> list[Problem]:
     """Names that are not there, and what who runs a rule can neither hear nor make ready."""
-    plugins = PluginIndex.installed()
+    parts = model.parts if model is not None else None
+    plugins = PluginIndex.installed() if parts is None else parts.index
     steps = (
         problem for index in range(len(file.rules.rules)) for problem in unprepared(file, index, plugins)
     )

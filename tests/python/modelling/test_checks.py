@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.modelling.package_model import PackageModel, load_model
+from mauve_rt.modelling.loading import load_model
+from mauve_rt.modelling.package_model import PackageModel
 
 GUIDANCE = Path(__file__).with_name("guidance.yaml")
 W1 = "W1: {wait: 1 * unit_ms, next: Idle}"

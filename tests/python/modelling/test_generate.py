@@ -14,7 +14,7 @@ from mauve_rt.modelling.generate import (
     write_generated,
     write_skeletons,
 )
-from mauve_rt.modelling.package_model import load_model
+from mauve_rt.modelling.loading import load_model
 
 GUIDANCE = Path(__file__).with_name("guidance.yaml")
 

@@ -14,7 +14,8 @@ from mauve_rt.errors import MauveError
 from mauve_rt.model.plugins import PluginIndex, PluginLoader, parse_index
 from mauve_rt.model.registered_model import registered_model
 from mauve_rt.modelling.generate import generated, skeletons, write_generated, write_skeletons
-from mauve_rt.modelling.package_model import PackageModel, load_model
+from mauve_rt.modelling.loading import load_model
+from mauve_rt.modelling.package_model import PackageModel
 from mauve_rt.yaml.writer import write_yaml
 
 GUIDANCE = Path(__file__).with_name("guidance.yaml")

@@ -6,7 +6,7 @@ import pytest
 
 from mauve_rt.cli.graph_file import drawing_of_file
 from mauve_rt.cli.graph_model import fsm_of_model
-from mauve_rt.modelling.package_model import load_model
+from mauve_rt.modelling.loading import load_model
 
 EXAMPLES = Path(__file__).parents[3] / "mauve_examples"
 

@@ -196,6 +196,49 @@ def test_a_core_derives_from_the_one_that_it_replaces_if_that_can_be(here: Path)
     )
 
 
+@pytest.fixture
+def modelled(here: Path) -> Path:
+    """A package with the model of the paper's Guidance."""
+    guidance = Path(__file__).parents[1] / "modelling/guidance.yaml"
+    folder = here / "my_robot"
+    folder.mkdir()
+    (folder / "package.xml").write_text("<package><name>my_robot</name></package>")
+    (folder / "model.yaml").write_text(guidance.read_text(encoding="utf-8"), encoding="utf-8")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "base", ["Guidance", "my_robot/PlannedGuidance", "GuidanceShell", "GuidanceCore", ""]
+)
+def test_a_core_of_a_model_has_its_actions_and_guards(
+    base: str, modelled: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = ["--for", base] if base else []
+    assert main(["new", "core", "CarefulGuidance", "--in", str(modelled), *words]) == 0
+    told = capsys.readouterr()
+    assert told.out.splitlines()[0] == str(modelled / "src/careful_guidance.hpp")
+    assert "add `CarefulGuidance: {}` to cores.Guidance.implementations" in told.err
+    header = (modelled / "src/careful_guidance.hpp").read_text()
+    assert "class CarefulGuidance final : public GuidanceCore {" in header
+    for method in ("void compute_path() override;", "bool has_new_goal() const override;"):
+        assert method in header
+    assert main(["check", str(modelled / "model.yaml")]) == 0
+
+
+def test_a_core_of_a_model_in_python_is_one(modelled: Path) -> None:
+    assert main(["new", "core", "Careful", "--python", "--for", "Guidance", "--in", str(modelled)]) == 0
+    assert "class Careful(GuidanceCore):" in (modelled / "my_robot_parts/careful.py").read_text()
+
+
+def test_a_core_that_the_model_lacks_is_refused(modelled: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = files(modelled)
+    assert main(["new", "core", "Careful", "--for", "Guidence", "--in", str(modelled)]) == 2
+    assert (
+        "model.yaml has no such core, shell or algorithm; did you mean Guidance?" in capsys.readouterr().err
+    )
+    assert files(modelled) == before
+
+
 def test_without_a_package_the_remedy_is_said(capsys: pytest.CaptureFixture[str]) -> None:
     for words in (["new", "component", "lift"], ["build"], ["run"]):
         assert main(words) == 2
