@@ -127,8 +127,9 @@ class PluginIndex:
         return index
 
     def without(self, package: str) -> Self:
-        """The same but for what has names of a package."""
-        others = (each for each in self if each.name.partition("/")[0] != package)
+        """The same but for what has names of a package, and for all else that is loaded with that."""
+        gone = {each.source for each in self if each.name.partition("/")[0] == package}
+        others = (each for each in self if each.source not in gone)
         return type(self)(others, self.complaints)
 
     @property

@@ -40,3 +40,12 @@ def test_a_slow_planner_takes_the_time_of_those_below(tmp_path: Path) -> None:
     trace = mauve_rt.trace.open(bag)
     assert [*trace.components] == ["robot", "control", "guidance", "mapping", "exploration"]
     assert trace.lost == 0
+
+
+def test_its_model_takes_the_place_of_the_installed_parts() -> None:
+    """The library of the package has types of other packages as well: it is not loaded beside the model."""
+    status, told = analyzed("--model", str(ROBOT.parents[1] / "model.yaml"))
+    assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
+    assert [one["response"] for one in told["components"]] == [
+        one["response"] for one in analyzed()[1]["components"]
+    ]
