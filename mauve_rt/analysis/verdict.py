@@ -7,8 +7,8 @@ from enum import StrEnum
 
 from mauve_rt.analysis.bounds import Bound, Subject, by_cpu, delaying
 from mauve_rt.analysis.machines import in_ms
-from mauve_rt.analysis.schedule import Cycle, Member, Schedule
-from mauve_rt.analysis.witness import RUNS, witness_of
+from mauve_rt.analysis.schedule import Cycle, Schedule
+from mauve_rt.analysis.witness import RUNS, member_of, witness_of
 
 
 class Outcome(StrEnum):
@@ -58,11 +58,11 @@ def judge(
     late = [subject for subject in components if not bounds[subject.name].meets_deadline]
     for here in by_cpu(subjects) if searches else ():
         if any(subject in late for subject in here):
-            members = [_member(subject) for subject in here]
+            members = [member_of(subject) for subject in here]
             found = witness_of(members, wakeup_ns=wakeup_ns)
             if found is not None and found.missed is not None:
                 priorities = {subject.name: subject.machine.priority for subject in here}
-                return Verdict(Outcome.NOT_SCHEDULABLE, _miss(found, found.missed, priorities), found)
+                return Verdict(Outcome.NOT_SCHEDULABLE, miss_text(found, found.missed, priorities), found)
     missing = [subject.name for subject in missing_of(subjects)]
     missing += ["this computer"] if unknown else []
     if missing:
@@ -91,12 +91,8 @@ def missing_of(subjects: Sequence[Subject]) -> list[Subject]:
     ]
 
 
-def _member(subject: Subject) -> Member:
-    sections = tuple((section.resource, section.length_ns) for section in subject.sections)
-    return Member(subject.machine, subject.task, sections)
-
-
-def _miss(schedule: Schedule, missed: Cycle, priorities: Mapping[str, int]) -> str:
+def miss_text(schedule: Schedule, missed: Cycle, priorities: Mapping[str, int]) -> str:
+    """Which component misses which deadline, and through what."""
     own_ns, blocking, others = 0, Counter[str](), Counter[str]()
     for (name, resource), share_ns in schedule.shares_ns(missed).items():
         if name == missed.component:

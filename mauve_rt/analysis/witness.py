@@ -7,6 +7,7 @@ costliest and the densest way that the fsms have; the others draw.
 from collections.abc import Callable, Sequence
 from random import Random
 
+from mauve_rt.analysis.bounds import Subject
 from mauve_rt.analysis.digraph import START, Job
 from mauve_rt.analysis.machines import FOREVER_NS
 from mauve_rt.analysis.schedule import Member, Schedule, run
@@ -27,11 +28,17 @@ def witness_of(members: Sequence[Member], *, wakeup_ns: int = 0) -> Schedule | N
         way = _WAYS[number] if number < len(_WAYS) else None
         order = [*members] if way else random.sample(members, len(members))
         most_jobs = _MOST_JOBS if way else _MOST_JOBS // RUNS
-        choices = _Drawn(random, members, way, wakeup_ns)
+        choices = Drawn(random, members, way, wakeup_ns)
         found = run(order, choices, most_jobs=most_jobs, until_repeated=way is not None)
         if found.missed is not None:
             return found
     return None
+
+
+def member_of(subject: Subject) -> Member:
+    """As a run takes it."""
+    sections = tuple((section.resource, section.length_ns) for section in subject.sections)
+    return Member(subject.machine, subject.task, sections)
 
 
 def _has_choices(members: Sequence[Member], wakeup_ns: int) -> bool:
@@ -55,8 +62,10 @@ _Way = Callable[[Job], float]
 _WAYS: tuple[_Way, ...] = (_costliest, _densest)
 
 
-class _Drawn:
+class Drawn:
     """Choices of one run: by a way, or each component by one of its own or by drawing."""
+
+    WAYS = _WAYS
 
     def __init__(self, random: Random, members: Sequence[Member], way: _Way | None, wakeup_ns: int) -> None:
         self._random = random
@@ -66,6 +75,7 @@ class _Drawn:
         self._instants_ns = [member.machine.offset_ns for member in members]
 
     def first(self, member: Member) -> tuple[Job, int]:
+        """As Choices."""
         machine = member.machine
         initial = next(state for state in machine.states if state.is_initial)
         if not initial.is_wait:
@@ -79,15 +89,18 @@ class _Drawn:
         return self._one_of(member, jobs), machine.offset_ns + initial.separation_ns
 
     def next(self, member: Member, job: Job) -> tuple[Job, int] | None:
+        """As Choices."""
         following = member.task.after(job)
         if not following or job.separation_ns == FOREVER_NS:
             return None
         return self._one_of(member, following), self._later_ns(member, job)
 
     def late_ns(self) -> int:
+        """As Choices."""
         return self._random.choice((0, self._wakeup_ns)) if self._draws else self._wakeup_ns
 
     def before_locks_ns(self, left_ns: int) -> int:
+        """As Choices."""
         return self._random.choice((0, left_ns, self._random.randint(0, left_ns))) if self._draws else left_ns
 
     def _later_ns(self, member: Member, job: Job) -> int:

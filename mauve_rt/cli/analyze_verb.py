@@ -161,13 +161,9 @@ def main(args: argparse.Namespace) -> int:
         print_verdict(now, assumptions)
         for plan in plans:
             print_plan(plan)
-    if now.verdict.witness is not None and args.witness is not None:
-        from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
-
-        machines = [subject.machine for subject in now.subjects]
-        write_witness(args.witness, machines, now.verdict.witness)
-        print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
     studies = [now, *(each for plan in plans for each in (plan.during, plan.after))]
+    if args.witness is not None:
+        _write_witness(args.witness, studies)
     outcomes = {each.verdict.outcome.name for each in studies}
     return next(status for name, status in _STATUSES.items() if name in outcomes)
 
@@ -197,6 +193,16 @@ def _wrong_arguments(args: argparse.Namespace) -> str:
         option = "--plan" if args.plan is not None else "--alternatives"
         return f"{option}: expected an architecture FILE whose parts are installed"
     return ""
+
+
+def _write_witness(folder: Path, studies: "Sequence[Study]") -> None:
+    """The first run that misses a deadline, as a bag."""
+    from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
+
+    missing = next((study for study in studies if study.verdict.witness is not None), None)
+    if missing is not None and missing.verdict.witness is not None:
+        write_witness(folder, [subject.machine for subject in missing.subjects], missing.verdict.witness)
+        print(f"{folder}: a bag of that run; mauve report {folder} opens at it", file=sys.stderr)
 
 
 def _surroundings(found: "Analyzed", args: argparse.Namespace) -> "Surroundings":

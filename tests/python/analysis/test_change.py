@@ -3,13 +3,19 @@
 from random import Random
 
 import pytest
+from analysis_machines import MS, execution, machine, wait
 from random_digraphs import random_digraph
 from schedule_simulation import RUN, Release, simulate
 
 from mauve_rt.analysis import change as module
 from mauve_rt.analysis.change import Member, Participant, times_during
+from mauve_rt.analysis.change_witness import change_witness
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.digraph_times import Component, digraph_times
+from mauve_rt.analysis.machines import Machine
+from mauve_rt.analysis.study import Study, Surroundings, study, study_of_change
+from mauve_rt.analysis.verdict import Outcome
+from mauve_rt.model.threads import ThreadList
 
 
 def loop(name: str, cost: int, separation: int, priority: int, *, part: str = "") -> Component:
@@ -158,3 +164,47 @@ def test_no_run_with_a_change_is_above_its_bound(jitter: int) -> None:
                 reached += longest[name] == one.response_ns
     assert bounded > 400
     assert reached > bounded / 10
+
+
+# ---- a run that misses a deadline in a change
+
+
+def study_for(machines: list[Machine]) -> Study:
+    return study(machines, NOTHING_ELSE)
+
+
+NOTHING_ELSE = Surroundings(threads=ThreadList(0, 0, ()))
+
+
+def random_machines(random: Random) -> list[Machine]:
+    return [
+        machine(
+            execution("Run", "Pause", wcet_ms=random.randint(1, 6), initial=True),
+            wait("Pause", "Run", ms=period),
+            name=f"T{number}",
+            priority=60 - number,
+            offset_ns=random.choice((0, 0, 3 * MS)),
+        )
+        for number, period in enumerate((12, 18, 30))
+    ]
+
+
+def test_no_run_of_a_change_is_above_its_bound() -> None:
+    met = missed = 0
+    for seed in range(30):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        one, other = study_for(random_machines(random)), study_for(random_machines(random))
+        found = study_of_change(one, other, {}, NOTHING_ELSE)
+        sides = [{subject.name: subject for subject in each.subjects} for each in (one, other)]
+        run = change_witness(*sides, {})
+        if found.verdict.outcome == Outcome.SCHEDULABLE:
+            met += 1
+            assert run is None, seed
+        if run is not None and run[0].missed is not None:
+            missed += 1
+            cycle = run[0].missed
+            response_ns = found.bounds[cycle.component].response_ns
+            if response_ns is not None:
+                assert cycle.finish_ns - cycle.nominal_ns <= response_ns, seed
+    assert met > 3
+    assert missed > 3
