@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from mauve_rt._kernel import PluginRegistry
     from mauve_rt.model import ArchitectureModel
     from mauve_rt.modelling.package_model import PackageModel
+    from mauve_rt.trace.reading.trace import Trace
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,11 @@ def _of_bag(path: Path) -> Analyzed:
     trace = mauve_rt.trace.open(path)
     if not trace.architecture:
         raise TraceError(f"bag {path}: it does not tell the architecture; record it again with this version")
+    return of_trace(trace)
+
+
+def of_trace(trace: "Trace") -> Analyzed:
+    """What a bag tells."""
     threads = None if trace.threads is None else _threads_of(trace.threads)
     return Analyzed(_of_told(trace.architecture, {}), threads)
 

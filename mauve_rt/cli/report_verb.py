@@ -53,6 +53,7 @@ def main(args: argparse.Namespace) -> int:
 
 def _report(args: argparse.Namespace, out: Path) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415 - numpy and rich take their time to load
+    from mauve_rt.cli.timing_section import timing_section  # noqa: PLC0415
     from mauve_rt.trace.progress import part  # noqa: PLC0415
     from mauve_rt.trace.report import write_report  # noqa: PLC0415
     from mauve_rt.trace.report.bags import bag_names, open_bags  # noqa: PLC0415
@@ -61,6 +62,7 @@ def _report(args: argparse.Namespace, out: Path) -> int:
     title = args.title or f"Trace of {', '.join(bag_names(bags))}"
     with shown() as progress:
         trace = open_bags(bags, progress=part(progress, 0, 0.5))
-        write_report(out, trace, title=title, progress=part(progress, 0.5, 1))
+        sections = [timing_section] if trace.threads is not None else []
+        write_report(out, trace, title=title, more=sections, progress=part(progress, 0.5, 1))
     print(f"{out} ({out.stat().st_size / 1e6:.1f} MB)")
     return OK

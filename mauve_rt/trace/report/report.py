@@ -39,6 +39,7 @@ def write_report(
     title: str = "Trace report",
     extra: Sequence[Section] = (),
     figures: Sequence[Card] = (),
+    more: Sequence[Callable[[Analysis], Section | None]] = (),
     verdict: Callable[[Verdict], Verdict] | None = None,
     events: Iterable[Any] | None = None,
     zero_ns: int | None = None,
@@ -52,6 +53,7 @@ def write_report(
         trace: of one executor, or of several merged ones.
         title: the page's.
         extra: sections to stand before those about the trace.
+        more: make sections to stand behind those about components.
         figures: cards to stand before those about the trace, which are fewer for it.
         verdict: makes what stands at the top of what the trace tells; that itself when not given.
         events: the executors' ReconfigurationEvent messages by time, when they have been read already.
@@ -80,6 +82,7 @@ def write_report(
         distributions_section,
         architecture_section,
         components_section,
+        *more,
         resources_section,
         losses_section,
     )

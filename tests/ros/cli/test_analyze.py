@@ -122,3 +122,40 @@ def test_the_list_of_threads_is_the_one_that_runs(
         if policy != os.SCHED_FIFO or name in components or name.startswith(silent):
             continue
         assert listed.get(name) == priority.sched_priority, name
+
+
+ALONE = """\
+mauve: 1
+executor: {namespace: /robot_1, wakeup_us: 900000, overhead_ns: 20000}
+components:
+  counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+            priority: 40, cpus: [0], properties: {period_ms: 20}, deadline_ns: 2000000000,
+            states: {Count: {wcet_ns: 1000000}}}
+resources:
+  count: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: count, direction: publish}}
+connections:
+  - [counter.count, count.write]
+"""
+
+
+def test_the_report_of_a_run_has_bounds_beside_what_was_measured(
+    start_executor: Callable[..., Any], graph: Any, tmp_path: Path
+) -> None:
+    architecture, bag, page = tmp_path / "alone.yaml", tmp_path / "bag", tmp_path / "page.html"
+    architecture.write_text(ALONE, encoding="utf-8")
+    executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 5, "counts")
+    assert executor.end(signal.SIGTERM)[0] == 0
+    command = [sys.executable, "-m", "mauve_rt.cli"]
+    options: dict[str, Any] = {"capture_output": True, "text": True, "check": False, "timeout": 200}
+    done = subprocess.run([*command, "report", str(bag), "--out", str(page)], **options)
+    assert (done.returncode, done.stderr) == (0, "")
+    text = page.read_text(encoding="utf-8")
+    told = json.loads(subprocess.run([*command, "analyze", str(bag), "--json"], **options).stdout)
+    [counter] = told["components"]
+    has_bound = counter["response"]["response_ns"] is not None
+    assert has_bound or counter["not_provable"], "without real-time rights nothing is proved"
+    assert ("The bounds are those of mauve analyze" in text) == has_bound
+    if has_bound:
+        assert f"{told['verdict']['sentence']}." in text
