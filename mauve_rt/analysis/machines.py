@@ -96,6 +96,8 @@ class Hold:
 
 _CLIENT = "client"
 """Kind of a resource whose calls a ROS service answers: the caller waits for it, for no other component."""
+_SERVICE = "/srv/"
+"""In the type of a port that calls one; of a resource of unknown kind that says what it is."""
 _WITHOUT_LOCK = ("latest_value", _CLIENT)
 """Kinds of resources: users do not wait for each other."""
 
@@ -144,8 +146,10 @@ class Machine:
         `kinds`: of resources, by name; each resource of an unknown kind has a lock, but for wait-free ports.
         """
         ports = [port for port in getattr(told, "ports", ()) if port.resource]
-        locking = (port for port in ports if not getattr(port, "wait_free", False))
+        locking = [port for port in ports if not getattr(port, "wait_free", False)]
         times = {port.resource: int(getattr(port, "longest_hold_ns", 0)) for port in locking}
+        of_services = {port.resource: _CLIENT for port in locking if _SERVICE in getattr(port, "type", "")}
+        kind_of = {**of_services, **(kinds or {})}
         return cls(
             name=told.name,
             cpus=tuple(int(cpu) for cpu in told.cpus),
@@ -161,9 +165,9 @@ class Machine:
             undeclared_locks=tuple(
                 resource
                 for resource, time_ns in sorted(times.items())
-                if not time_ns and (kinds or {}).get(resource) not in _WITHOUT_LOCK
+                if not time_ns and kind_of.get(resource) not in _WITHOUT_LOCK
             ),
-            clients=tuple(resource for resource in sorted(times) if (kinds or {}).get(resource) == _CLIENT),
+            clients=tuple(resource for resource in sorted(times) if kind_of.get(resource) == _CLIENT),
         )
 
     def with_budgets(self, budgets: Mapping[str, ExecutionTime]) -> Self:

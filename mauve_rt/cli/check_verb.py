@@ -17,8 +17,8 @@ if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wa
     from collections.abc import Iterable, Mapping, Sequence
 
     from mauve_rt.errors import Problem
+    from mauve_rt.file_schema.file_kind import FileKind
     from mauve_rt.model import ArchitectureModel
-    from mauve_rt.model.file_kinds import FileKind
     from mauve_rt.model.remarks import Subject, Uses
     from mauve_rt.modelling.loading import ModelLoader
     from mauve_rt.modelling.package_model import PackageModel
@@ -38,7 +38,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Check every file; returns the exit status."""
-    from mauve_rt.model.file_kinds import FileKind, file_kind  # noqa: PLC0415
+    from mauve_rt.file_schema.file_kind import FileKind  # noqa: PLC0415
+    from mauve_rt.model.file_kinds import file_kind  # noqa: PLC0415
 
     kinds: dict[Path, FileKind] = {}
     for path in args.files:
@@ -58,7 +59,7 @@ def main(args: argparse.Namespace) -> int:
 
 def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
     """Check files in this order. The warnings of an architecture come when all files are read."""
-    from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
+    from mauve_rt.file_schema.file_kind import FileKind  # noqa: PLC0415
     from mauve_rt.model.remarks import Uses, remarks  # noqa: PLC0415
     from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 

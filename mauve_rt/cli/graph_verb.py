@@ -13,8 +13,8 @@ from mauve_rt.cli.verb import BAD_USAGE, OK
 from mauve_rt.errors import ArchitectureFileError, ParameterError
 
 if TYPE_CHECKING:  # loaded by those who draw only
+    from mauve_rt.file_schema.file_kind import FileKind
     from mauve_rt.graph.drawing import Drawing
-    from mauve_rt.model.file_kinds import FileKind
 
     Kinds = Mapping[Path, FileKind]
 
@@ -92,7 +92,8 @@ def _writer(suffix: str) -> "Callable[[Drawing], str]":
 
 def _drawing(args: argparse.Namespace) -> "Drawing":
     from mauve_rt.cli.graph_file import Topics, with_rules  # noqa: PLC0415
-    from mauve_rt.model.file_kinds import FileKind, file_kind  # noqa: PLC0415
+    from mauve_rt.file_schema.file_kind import FileKind  # noqa: PLC0415
+    from mauve_rt.model.file_kinds import file_kind  # noqa: PLC0415
 
     described = [one for one in args.subject if _is_node(one) or is_bag(Path(one))]
     kinds = {Path(one): file_kind(one) for one in args.subject if one not in described}
@@ -123,7 +124,7 @@ def _is_node(text: str) -> bool:
 def _of_files(kinds: "Kinds", args: argparse.Namespace) -> "tuple[Drawing, Any]":
     from mauve_rt.cli.graph_file import Topics, drawing_of_file, fsm_of_file  # noqa: PLC0415
     from mauve_rt.cli.graph_model import drawing_of_model, fsm_of_model  # noqa: PLC0415
-    from mauve_rt.model.file_kinds import FileKind  # noqa: PLC0415
+    from mauve_rt.file_schema.file_kind import FileKind  # noqa: PLC0415
     from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
 
     paths = [path for path, kind in kinds.items() if kind is FileKind.MODEL]

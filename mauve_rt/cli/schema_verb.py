@@ -3,7 +3,7 @@
 import argparse
 
 from mauve_rt.cli.verb import OK
-from mauve_rt.model.file_kinds import FileKind
+from mauve_rt.file_schema.file_kind import FileKind
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

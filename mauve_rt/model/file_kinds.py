@@ -1,18 +1,9 @@
 """Which kind of file of ours a YAML file is: its contents say so, not its name."""
 
-from enum import Enum
 from pathlib import Path
 
+from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.file_schema.yaml_file import YamlFile
-
-
-class FileKind(Enum):
-    """The files that MAUVE RT reads."""
-
-    ARCHITECTURE = "architecture"
-    RULES = "rules"
-    STEPS = "steps"
-    MODEL = "model"
 
 
 def file_kind(path: str | Path) -> FileKind:

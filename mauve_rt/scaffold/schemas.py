@@ -8,7 +8,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from mauve_rt.model.file_kinds import FileKind
+from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.model.schema import FileModel
 from mauve_rt.model.steps import steps_schema
 from mauve_rt.modelling.schema import ModelFile

@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mauve_rt.errors import ArchitectureFileError, ParameterError
+from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.file_schema.words import did_you_mean
 from mauve_rt.file_schema.yaml_file import YamlFile
-from mauve_rt.model.file_kinds import FileKind, file_kind
+from mauve_rt.model.file_kinds import file_kind
 from mauve_rt.modelling.checks import abstract_class
 from mauve_rt.modelling.loading import MODEL, load_model
 from mauve_rt.modelling.package_model import PackageModel

@@ -304,6 +304,13 @@ def test_one_that_waits_for_a_service_meets_its_equals_again() -> None:
     assert bounds(loop("caller", 9, 90), other)["caller"].response_ns == 17 * MS
 
 
+def test_a_bag_that_tells_no_kinds_shows_a_client_by_the_type_of_its_port() -> None:
+    port = SimpleNamespace(resource="lamp", longest_hold_ns=0, type="std_srvs/srv/SetBool")
+    caller = loop("caller", 9, 90, ports=[port])
+    assert (caller.clients, caller.undeclared_locks) == (("lamp",), ())
+    assert loop("user", 9, 90, ports=[port], kinds={"lamp": "my_robot/Lamp"}).clients == ()
+
+
 def test_a_load_of_exactly_one_is_bounded_where_nothing_comes_on_top() -> None:
     full = (loop("high", 2, 4, priority=60), loop("low", 4, 8, priority=50))
     assert bounds(*full)["low"] == Bound(8 * MS, 8 * MS)

@@ -19,12 +19,13 @@ from jsonschema import Draft202012Validator
 from mauve_rt.cli.main import main
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.file_schema import kinds
+from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.file_schema.json_schema import text_form
 from mauve_rt.file_schema.kinds import Fault, Faults
 from mauve_rt.file_schema.section import Part, Section
 from mauve_rt.file_schema.yaml_file import YamlFile
 from mauve_rt.model.architecture_file import ArchitectureModel, Overrides, element_problems
-from mauve_rt.model.file_kinds import FileKind, file_kind
+from mauve_rt.model.file_kinds import file_kind
 from mauve_rt.model.schema import FileModel
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import STEPS, Change

@@ -9,7 +9,16 @@ from mauve_rt.cli.main import main
 
 ROOT = Path(__file__).resolve().parents[3]
 MISSION = ROOT / "mauve_examples" / "architecture"
+WORST_CASES = {
+    "Robot": "Move: {wcet_ns: 200000}",
+    "Control": "Control: {wcet_ns: 600000}",
+    "Mapping": "Integrate: {wcet_ns: 2000000}",
+}
 ROBOT = (MISSION / "robot.yaml").read_text(encoding="utf-8").replace("../maps", str(MISSION.parent / "maps"))
+for core, times in WORST_CASES.items():
+    line = f"    core: mauve_examples/{core}\n"
+    assert ROBOT.count(line) == 1, line
+    ROBOT = ROBOT.replace(line, f"{line}    states: {{{times}}}\n")
 RULES = (MISSION / "supervisor.yaml").read_text(encoding="utf-8")
 TWIST = "{kind: shared_data, type: geometry_msgs/msg/Twist}"
 Check = Callable[..., list[str]]

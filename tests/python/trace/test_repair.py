@@ -95,7 +95,7 @@ def test_a_bag_cut_off_anywhere_is_finished_by_a_repair(tmp_path: Path):
         assert_rosbag2_reads(bag)
         found.add(len(there))
         shutil.rmtree(bag)
-    assert len(found) > 5
+    assert len(found) > 3
 
 
 def test_the_old_end_below_a_torn_write_is_no_data(tmp_path: Path):
