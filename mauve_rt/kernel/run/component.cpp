@@ -439,12 +439,13 @@ void Component::require_declared_states(const FsmBase& fsm) const {
       if (!state->is_wait || (is_worst_case && !state->transitions.empty())) suitable.push_back(state->name);
     }
     if (std::ranges::find(suitable, declared.name) != suitable.end()) continue;
-    throw Error(ErrorCode::bad_fsm, "the fsm has no such execution state",
-                {.component = name_,
-                 .element = fsm.description(),
-                 .expected = "one of " + join(suitable),
-                 .found = declared.name,
-                 .remedy = "declare times of the states that the fsm executes; of a wait with guards wcet_ns"});
+    throw Error(
+        ErrorCode::bad_fsm, "the fsm has no such execution state",
+        {.component = name_,
+         .element = fsm.description(),
+         .expected = "one of " + join(suitable),
+         .found = declared.name,
+         .remedy = "declare times of the states that the fsm executes; of a wait with guards wcet_ns"});
   }
 }
 

@@ -89,7 +89,8 @@ TYPED_TEST(CoreTimesOfStates, OfAWaitAreThoseOfItsGuards) {
 }
 
 TYPED_TEST(CoreTimesOfStates, OfAWaitYieldToTheSettings) {
-  Component& component = this->add_guarded("t/Timed", {.states = {{.name = "Pause", .wcet_ns = us_to_ns(9)}}});
+  Component& component =
+      this->add_guarded("t/Timed", {.states = {{.name = "Pause", .wcet_ns = us_to_ns(9)}}});
   EXPECT_EQ(us_to_ns(9), this->state_of(component.previewed_states(), "Pause").wcet_ns);
   this->deploy();
   EXPECT_EQ(us_to_ns(9), this->wcet_of(component, "Pause"));

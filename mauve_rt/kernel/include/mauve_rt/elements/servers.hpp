@@ -37,13 +37,14 @@ struct ServerShell : Shell {
                 .minimum = 1,
                 .maximum = 64,
                 .structural = ReadBy::fsm});
-  Property<std::int64_t>& wcet_us = property(
-      "wcet_us", 0,
-      {.unit = "us",
-       .description = "worst-case execution time of one request, taking it included, for the timing analysis; 0: not declared",
-       .minimum = 0,
-       .maximum = 3.6e9,
-       .structural = ReadBy::fsm});
+  Property<std::int64_t>& wcet_us =
+      property("wcet_us", 0,
+               {.unit = "us",
+                .description = "worst-case execution time of one request, taking it included, for the timing "
+                               "analysis; 0: not declared",
+                .minimum = 0,
+                .maximum = 3.6e9,
+                .structural = ReadBy::fsm});
   ReadPort<T>& requests = this->template read_port<T>("requests");
 };
 

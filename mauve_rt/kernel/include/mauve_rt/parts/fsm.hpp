@@ -117,7 +117,8 @@ struct State {
   std::size_t action{kNone};            // of an execution state
   time_ns_t max_execution_ns{0};        // declared bound of an execution state; 0: none
   time_ns_t simulated_execution_ns{0};  // what it takes in virtual time
-  time_ns_t wcet_ns{0};  // its worst case, of a wait that of its guards, for the timing analysis; 0: not declared
+  time_ns_t wcet_ns{
+      0};  // its worst case, of a wait that of its guards, for the timing analysis; 0: not declared
   std::vector<Transition> transitions;  // the first whose guard holds is taken; of a wait, when it has ended
   State* next{nullptr};                 // otherwise this one
   std::uint32_t trace_id{0};
