@@ -9,6 +9,7 @@ from mauve_rt.analysis.digraph import DigraphTask, digraph_of, period_of
 from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime, digraph_times
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 from mauve_rt.analysis.obstacles import obstacles
+from mauve_rt.analysis.offsets import Grid, times_with_offsets
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,9 @@ class Subject:
         )
 
 
+OFFSETS = "offsets"
+
+
 @dataclass(frozen=True)
 class Bound:
     """Of the jobs of a component."""
@@ -64,6 +68,8 @@ class Bound:
     """Of each execution state the longest time from its begin to its end."""
     too_long: tuple[str, ...] = ()
     """What may last beyond its wall-clock bound, in words."""
+    by: str = ""
+    """The analysis that found it: OFFSETS; empty: without offsets, which holds for any."""
 
     @property
     def meets_deadline(self) -> bool:
@@ -78,14 +84,41 @@ def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, B
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
     """
     times: dict[str, DigraphTimes] = {}
+    levels: dict[str, list[Subject]] = {}
     for here in by_cpu(subjects):
         found = digraph_times([component_of(subject, jitter_ns=wakeup_ns) for subject in here])
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
-    return {
-        subject.name: bound_of(subject, subjects, times)
-        for subject in subjects
-        if subject.machine.is_component
-    }
+        levels |= {subject.name: here for subject in here}
+    bounds: dict[str, Bound] = {}
+    for subject in subjects:
+        if not subject.machine.is_component:
+            continue
+        bound = bound_of(subject, subjects, times)
+        if bound.response_ns is not None and not bound.meets_deadline:
+            shorter = _with_offsets(subject, levels[subject.name], times[subject.name], wakeup_ns)
+            if shorter != times[subject.name]:
+                bound = replace(bound_of(subject, subjects, {**times, subject.name: shorter}), by=OFFSETS)
+        bounds[subject.name] = bound
+    return bounds
+
+
+def _with_offsets(
+    subject: Subject, here: Sequence[Subject], without: DigraphTimes, wakeup_ns: int
+) -> DigraphTimes:
+    components = {each.name: component_of(each, jitter_ns=wakeup_ns) for each in here}
+    grids = {each.name: grid for each in here if (grid := grid_of(each.machine)) is not None}
+    return times_with_offsets(components[subject.name], [*components.values()], grids, without)
+
+
+def grid_of(machine: Machine) -> Grid | None:
+    """At which instants its jobs arrive; None: no grid has them all."""
+    waits = [state.separation_ns for state in machine.states if state.is_wait]
+    on_grid = all(wait_ns % machine.period_ns == 0 for wait_ns in waits if wait_ns != FOREVER_NS) if (
+        machine.period_ns
+    ) else False
+    if not machine.is_component or not on_grid or any(state.is_event_wait for state in machine.states):
+        return None
+    return Grid(machine.period_ns, machine.offset_ns)
 
 
 def component_of(subject: Subject, *, jitter_ns: int) -> Component:
