@@ -112,11 +112,11 @@ def _with_offsets(
 
 def grid_of(machine: Machine) -> Grid | None:
     """At which instants its jobs arrive; None: no grid has them all."""
-    waits = [state.separation_ns for state in machine.states if state.is_wait]
-    on_grid = all(wait_ns % machine.period_ns == 0 for wait_ns in waits if wait_ns != FOREVER_NS) if (
-        machine.period_ns
-    ) else False
-    if not machine.is_component or not on_grid or any(state.is_event_wait for state in machine.states):
+    if not machine.is_component or not machine.period_ns:
+        return None
+    waits = [state for state in machine.states if state.is_wait]
+    spacings_ns = [wait.separation_ns for wait in waits if wait.separation_ns != FOREVER_NS]
+    if any(wait.is_event_wait for wait in waits) or any(ns % machine.period_ns for ns in spacings_ns):
         return None
     return Grid(machine.period_ns, machine.offset_ns)
 

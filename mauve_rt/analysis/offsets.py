@@ -77,7 +77,7 @@ class _Work:
     """What some components ask for, by the instants of their grids; of others the most they can ask for."""
 
     def __init__(self, components: Sequence[Component], grids: Grids, hyperperiod_ns: int) -> None:
-        self.hyperperiod_ns = hyperperiod_ns
+        self.components, self.hyperperiod_ns = components, hyperperiod_ns
         self.grids = [grids[each.name] for each in components if each.name in grids]
         self.at_ns: dict[int, int] = {}
         """The work of those that ask for the same at each instant, by instant in the hyperperiod."""
@@ -204,7 +204,7 @@ class _Windows:
     def _finish_ns(self, first_ns: int, path: Path) -> int:
         """When the last job of the path is done, from the begin of the window on."""
         begin_ns, equal_ns = first_ns + self.jitter_ns, 0
-        if self.equal.in_ns(first_ns, begin_ns + path.work_ns + self.equal.hyperperiod_ns):
+        if self.equal.components:
             before_ns = self.blocking_ns + path.work_ns - cost_of(path.job)
             start_ns = least_time_ns(
                 lambda time_ns: (

@@ -1,0 +1,183 @@
+"""Bounds with offsets: no run is above them, and where priorities are distinct a run comes to each of them.
+
+MAUVE_ANALYSIS_SETS=10000 tries more sets than CI does.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import lcm
+from random import Random
+
+import pytest
+from random_digraphs import random_sections
+from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step, simulate
+
+from mauve_rt.analysis import offsets as module
+from mauve_rt.analysis.digraph import DigraphTask, Job
+from mauve_rt.analysis.digraph_times import Component, DigraphTimes, digraph_times
+from mauve_rt.analysis.offsets import Grid, times_with_offsets
+
+SETS = int(os.environ.get("MAUVE_ANALYSIS_SETS", "600"))
+PERIODS = (4, 5, 6, 8, 10, 12, 15, 20, 24)
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Components of one CPU, those with a grid on it."""
+
+    components: list[Component]
+    grids: dict[str, Grid]
+
+    @property
+    def hyperperiod(self) -> int:
+        return lcm(*(grid.period_ns for grid in self.grids.values()))
+
+    def bounds(self) -> tuple[dict[str, DigraphTimes], dict[str, DigraphTimes]]:
+        """Without offsets, and with them."""
+        without = digraph_times(self.components)
+        return without, {
+            one.name: times_with_offsets(one, self.components, self.grids, without[one.name])
+            for one in self.components
+        }
+
+
+def loop(name: str, cost: int, period: int) -> DigraphTask:
+    return DigraphTask(name, (Job("W", (), cost, "W", period, 10**6),))
+
+
+def plain(random: Random, *, load: float | None = None) -> Placed:
+    """Periodic components with distinct priorities."""
+    count = random.randint(2, 5)
+    share = (load or random.uniform(0.4, 1.0)) / count
+    components, grids = [], {}
+    for number in range(count):
+        period = random.choice(PERIODS)
+        task = loop(f"T{number}", max(1, round(share * period * random.uniform(0.4, 1.6))), period)
+        components.append(Component(task, 1 + number, states=(("Run", task.jobs[0].cost_ns or 0),)))
+        grids[task.name] = Grid(period, random.randrange(period))
+    return Placed(components, grids)
+
+
+def on_grid(random: Random, name: str, *, share: float) -> tuple[DigraphTask, int]:
+    """Jobs between waits that are multiples of a period."""
+    period = random.choice(PERIODS)
+    waits = {f"W{number}": period * random.choice((1, 1, 1, 2)) for number in range(random.randint(1, 3))}
+    jobs = [
+        Job(after, (), max(1, round(share * period * random.uniform(0.3, 1.5))), until, waits[until], 10**6)
+        for after in waits
+        for until in random.sample([*waits], random.randint(1, len(waits)))
+    ]
+    return DigraphTask(name, tuple(jobs)), period
+
+
+def mixed(random: Random) -> Placed:
+    """With paths, equal priorities, late releases, locks, and tasks without a grid."""
+    count = random.randint(2, 5)
+    share = random.uniform(0.3, 0.9) / count
+    jitter = random.choice((0, 0, 1, 3))
+    with_locks = random.random() < 0.4
+    components, grids = [], {}
+    for number in range(count):
+        task, period = on_grid(random, f"T{number}", share=share)
+        if random.random() < 0.75:
+            grids[task.name] = Grid(period, random.randrange(2 * period))
+        sections = random_sections(random, task) if with_locks else ()
+        longest = max(job.cost_ns or 0 for job in task.jobs)
+        states = (("Run", longest),)
+        priority = random.randint(1, 3)
+        components.append(Component(task, priority, jitter_ns=jitter, sections=sections, states=states))
+    return Placed(components, grids)
+
+
+def path(random: Random, placed: Placed, one: Component, until: int) -> Iterator[Release]:
+    """One way through its jobs; `dense`: as early as it may."""
+    job, grid = random.choice(one.task.jobs), placed.grids.get(one.name)
+    arrival = grid.offset_ns % grid.period_ns if grid else random.randint(0, 40)
+    last, dense = 0, random.random() < 0.6
+    while arrival < until:
+        last = max(last, arrival + random.choice((0, one.jitter_ns)))
+        yield Release(arrival, last, program(random, one, job))
+        more = 0 if dense else random.choice((0, 0, random.randint(0, 2)))
+        arrival += job.separation_ns + (more * grid.period_ns if grid else more * random.randint(1, 5))
+        following = one.task.after(job)
+        if not following:
+            return
+        job = random.choice(following)
+
+
+def program(random: Random, one: Component, job: Job) -> list[Step]:
+    left, steps = job.cost_ns or 0, list[Step]()
+    for section in random.sample(one.sections, len(one.sections)):
+        before = random.randint(0, left // 2)
+        held = min(section.length_ns, left - before)
+        if held:
+            steps += [(RUN, before)] if before else []
+            steps += [(LOCK, section.resource), (RUN, held), (UNLOCK, section.resource)]
+            left -= before + held
+    return [*steps, (RUN, left)] if left else steps
+
+
+def longest_runs(random: Random, placed: Placed, *, runs: int = 6) -> dict[str, int]:
+    longest = {one.name: 0 for one in placed.components}
+    until = max(200, min(2 * placed.hyperperiod + 50, 500)) if placed.grids else 200
+    for _ in range(runs):
+        order = random.sample(placed.components, len(placed.components))
+        releases = {one.name: [*path(random, placed, one, until)] for one in order}
+        for name, response in simulate(order, releases).items():
+            longest[name] = max(longest[name], response)
+    return longest
+
+
+def all_releases(placed: Placed) -> dict[str, int]:
+    """The longest responses of a run of two hyperperiods, each job as costly and as early as it may be."""
+    until = 2 * placed.hyperperiod + max(PERIODS)
+    releases = {
+        one.name: [
+            Release(at, at, [(RUN, one.task.jobs[0].cost_ns or 0)])
+            for at in range(placed.grids[one.name].offset_ns, until, placed.grids[one.name].period_ns)
+        ]
+        for one in placed.components
+    }
+    return simulate(placed.components, releases)
+
+
+def test_each_bound_is_the_longest_response_of_the_hyperperiod() -> None:
+    shorter = total = 0
+    for seed in range(SETS):
+        placed = plain(Random(seed))  # noqa: S311 - not for secrets
+        without, with_them = placed.bounds()
+        longest = all_releases(placed)
+        for name, one in with_them.items():
+            if one.response_ns is not None:
+                assert one.response_ns == longest[name], (seed, name)
+                total += 1
+                shorter += one.response_ns < (without[name].response_ns or 0)
+    assert total > 2 * SETS
+    assert shorter > total / 10
+
+
+def exceeded(placed: Placed, random: Random) -> str:
+    """A component that a run takes longer for than its bound is; empty: none."""
+    longest = longest_runs(random, placed)
+    for name, one in placed.bounds()[1].items():
+        if one.response_ns is not None and longest[name] > one.response_ns:
+            return name
+    return ""
+
+
+def test_no_run_is_above_a_bound_with_offsets() -> None:
+    shorter = 0
+    for seed in range(2 * SETS):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        placed = mixed(random)
+        without, with_them = placed.bounds()
+        longest = longest_runs(random, placed)
+        for name, one in with_them.items():
+            simple = without[name].response_ns
+            if simple is None:
+                continue
+            assert one.response_ns is not None
+            assert longest[name] <= one.response_ns <= simple, (seed, name)
+            shorter += one.response_ns < simple
+    assert shorter > SETS / 4
