@@ -175,7 +175,7 @@ class _Windows:
         }
         in_order = sorted(instants)
         arriving = [self.higher.at_ns.get(at_ns, 0) + self.equal.at_ns.get(at_ns, 0) for at_ns in in_order]
-        backlog_ns, last_ns = 0, 0
+        backlog_ns, last_ns = 0, -self.higher.hyperperiod_ns
         for round_ns in (-self.higher.hyperperiod_ns, 0):  # the first round finds the backlog at 0
             for instant_ns, work_ns in zip(in_order, arriving, strict=True):
                 at_ns = round_ns + instant_ns
