@@ -69,7 +69,12 @@ class Bound:
     too_long: tuple[str, ...] = ()
     """What may last beyond its wall-clock bound, in words."""
     by: str = ""
-    """The analysis that found it: OFFSETS; empty: without offsets, which holds for any."""
+    """OFFSETS: it holds while components keep their offsets; empty: it holds for any offsets."""
+
+    @property
+    def how(self) -> str:
+        """As ` (with offsets)`, to stand behind the bound."""
+        return f" (with {self.by})" if self.by else ""
 
     @property
     def meets_deadline(self) -> bool:
@@ -79,7 +84,7 @@ class Bound:
 
 
 def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, Bound]:
-    """The bound of each component.
+    """The bound of each component; where a deadline would not be met without offsets, with them.
 
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
     """

@@ -369,6 +369,7 @@ def test_the_latency_of_the_machine_is_in_the_bound(told: Callable[..., dict[str
         "reason": "",
         "blocking_ns": 0,
         "too_long": [],
+        "by": "",
     }
 
 
