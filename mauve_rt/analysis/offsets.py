@@ -112,10 +112,9 @@ class _Work:
 
 def _steady_cost_ns(task: DigraphTask, grid: Grid) -> int | None:
     """The most of any job, where a job of this cost can come at each instant of the grid."""
-    most = max(task.jobs, key=cost_of, default=None)
-    if most is None or most.separation_ns != grid.period_ns or most not in task.after(most):
-        return None
-    return cost_of(most)
+    most_ns = max((cost_of(job) for job in task.jobs), default=0)
+    steady = (job for job in task.jobs if job.separation_ns == grid.period_ns and job in task.after(job))
+    return most_ns if any(cost_of(job) == most_ns for job in steady) else None
 
 
 def _instants(grid: Grid, hyperperiod_ns: int) -> range:
