@@ -56,7 +56,8 @@ def times_with_offsets(
         return without
     jitter_ns = max(each.jitter_ns for each in (one, *higher, *equal))
     parts = [_Work(each, grids, hyperperiod_ns) for each in (higher, equal)]
-    windows = _Windows(_Own(one, grids.get(one.name)), *parts, without.blocking_ns, jitter_ns)
+    own = _Own(one, grids.get(one.name))
+    windows = _Windows(own, *parts, without.blocking_ns, jitter_ns, hyperperiod_ns)
     try:
         longest = windows.longest_ns()
         responses_ns = {
@@ -77,7 +78,7 @@ class _Work:
     """What some components ask for, by the instants of their grids; of others the most they can ask for."""
 
     def __init__(self, components: Sequence[Component], grids: Grids, hyperperiod_ns: int) -> None:
-        self.components, self.hyperperiod_ns = components, hyperperiod_ns
+        self.components, self._hyperperiod_ns = components, hyperperiod_ns
         self.grids = [grids[each.name] for each in components if each.name in grids]
         self.at_ns: dict[int, int] = {}
         """The work of those that ask for the same at each instant, by instant in the hyperperiod."""
@@ -100,7 +101,7 @@ class _Work:
         return [0, *accumulate(self.at_ns[instant_ns] for instant_ns in self._instants_ns)]
 
     def _before_ns(self, instant_ns: int) -> int:
-        rounds, rest_ns = divmod(instant_ns, self.hyperperiod_ns)
+        rounds, rest_ns = divmod(instant_ns, self._hyperperiod_ns)
         return rounds * self._sums_ns[-1] + self._sums_ns[bisect_left(self._instants_ns, rest_ns)]
 
     def in_ns(self, first_ns: int, end_ns: int) -> int:
@@ -151,6 +152,7 @@ class _Windows:
     equal: _Work
     blocking_ns: int
     jitter_ns: int
+    hyperperiod_ns: int
 
     def longest_ns(self) -> dict[Job, int]:
         """The longest response of each job, over all windows."""
@@ -170,12 +172,12 @@ class _Windows:
         instants = {
             instant_ns
             for grid in (*own, *self.higher.grids, *self.equal.grids)
-            for instant_ns in _instants(grid, self.higher.hyperperiod_ns)
+            for instant_ns in _instants(grid, self.hyperperiod_ns)
         }
         in_order = sorted(instants)
         arriving = [self.higher.at_ns.get(at_ns, 0) + self.equal.at_ns.get(at_ns, 0) for at_ns in in_order]
-        backlog_ns, last_ns = 0, -self.higher.hyperperiod_ns
-        for round_ns in (-self.higher.hyperperiod_ns, 0):  # the first round finds the backlog at 0
+        backlog_ns, last_ns = 0, -self.hyperperiod_ns
+        for round_ns in (-self.hyperperiod_ns, 0):  # the first round finds the backlog at 0
             for instant_ns, work_ns in zip(in_order, arriving, strict=True):
                 at_ns = round_ns + instant_ns
                 backlog_ns = max(0, backlog_ns - (at_ns - last_ns))
@@ -228,11 +230,11 @@ class _Windows:
         Where it begins, no component of higher priority has work.
         """
         firsts = sorted(
-            {at for grid in self.higher.grids for at in _instants(grid, self.higher.hyperperiod_ns)}
+            {at for grid in self.higher.grids for at in _instants(grid, self.hyperperiod_ns)}
         )
         if not firsts:
             return self._execution_ns(0, cost_ns)
-        before = [firsts[-1] - self.higher.hyperperiod_ns, *firsts]
+        before = [firsts[-1] - self.hyperperiod_ns, *firsts]
         return max(
             self._execution_ns(first_ns, cost_ns)
             for last_ns, first_ns in zip(before, firsts, strict=False)
