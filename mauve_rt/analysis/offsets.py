@@ -225,24 +225,24 @@ class _Windows:
         )
 
     def wall_ns(self, cost_ns: int, response_ns: int) -> int:
-        """How long an execution can last that begins at most `response_ns` after the job's arrival.
+        """How long an execution can last in a job that ends at most `response_ns` after its arrival.
 
         Where it begins, no component of higher priority has work.
         """
-        firsts = sorted(
-            {at for grid in self.higher.grids for at in _instants(grid, self.hyperperiod_ns)}
-        )
-        if not firsts:
-            return self._execution_ns(0, cost_ns)
-        before = [firsts[-1] - self.hyperperiod_ns, *firsts]
-        return max(
-            self._execution_ns(first_ns, cost_ns)
-            for last_ns, first_ns in zip(before, firsts, strict=False)
-            if self._executes_between(last_ns + self.jitter_ns, first_ns + self.jitter_ns, response_ns)
-        )
+        begins = [*self._begins(response_ns - cost_ns)] or [self.jitter_ns]
+        return max(self._execution_ns(begin_ns - self.jitter_ns, cost_ns) for begin_ns in begins)
 
-    def _executes_between(self, after_ns: int, until_ns: int, response_ns: int) -> bool:
+    def _begins(self, latest_ns: int) -> Iterator[int]:
+        """The worst instants of executions that begin at most so long after the arrival of their jobs."""
+        end_ns, grids = self.hyperperiod_ns, self.higher.grids
+        firsts = sorted({first_ns for grid in grids for first_ns in _instants(grid, end_ns)})
         if self.own.grid is None:
-            return True
-        arrival_ns = until_ns - (until_ns - self.own.grid.offset_ns) % self.own.grid.period_ns
-        return arrival_ns + response_ns > after_ns
+            yield from (first_ns + self.jitter_ns for first_ns in firsts)
+            return
+        twice = [*firsts, *(end_ns + first_ns for first_ns in firsts)]
+        for arrival_ns in _instants(self.own.grid, end_ns):
+            yield arrival_ns + latest_ns
+            from_ns = (arrival_ns - self.jitter_ns) % end_ns
+            to_ns = from_ns + min(latest_ns, end_ns)
+            for first_ns in twice[bisect_left(twice, from_ns) : bisect_left(twice, to_ns)]:
+                yield first_ns + self.jitter_ns

@@ -4,12 +4,13 @@ MAUVE_ANALYSIS_SETS=10000 tries more sets than CI does.
 """
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import lcm
 from random import Random
 
 import pytest
+from analysis_machines import MS, execution, machine
 from random_digraphs import random_sections
 from schedule_simulation import LOCK, RUN, UNLOCK, Release, Step, simulate
 
@@ -17,6 +18,7 @@ from mauve_rt.analysis import offsets as module
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.digraph_times import Component, DigraphTimes, digraph_times
 from mauve_rt.analysis.offsets import Grid, times_with_offsets
+from mauve_rt.analysis.schedule import Member, run
 
 SETS = int(os.environ.get("MAUVE_ANALYSIS_SETS", "600"))
 PERIODS = (4, 5, 6, 8, 10, 12, 15, 20, 24)
@@ -189,6 +191,96 @@ def test_no_run_is_above_a_bound_with_offsets() -> None:
             assert longest[name] <= one.response_ns <= simple, (seed, name)
             shorter += one.response_ns < simple
     assert shorter > SETS / 4
+
+
+def test_random_sets_are_schedulable_only_with_offsets() -> None:
+    """About one of ten sets of two to five components whose deadlines are their periods."""
+    only = 0
+    for seed in range(SETS):
+        placed = plain(Random(seed))  # noqa: S311 - not for secrets
+        without, with_them = placed.bounds()
+        only += meets_deadlines(placed, with_them) and not meets_deadlines(placed, without)
+    assert only > SETS / 100, only
+
+
+def meets_deadlines(placed: Placed, times: dict[str, DigraphTimes]) -> bool:
+    return all(
+        (response := times[one.name].response_ns) is not None and response <= one.task.jobs[0].separation_ns
+        for one in placed.components
+    )
+
+
+class OnTheGrid:
+    """Each job as early as it may be, but for a late wake-up."""
+
+    def __init__(self, random: Random, jitter: int) -> None:
+        self.random, self.jitter = random, jitter
+
+    def first(self, member: Member) -> tuple[Job, int]:
+        return member.task.jobs[0], member.machine.offset_ns
+
+    def next(self, member: Member, job: Job) -> tuple[Job, int]:
+        return member.task.after(job)[0], job.separation_ns
+
+    def late_ns(self) -> int:
+        return self.random.choice((0, self.jitter))
+
+    def before_locks_ns(self, left_ns: int) -> int:
+        return left_ns
+
+
+def test_no_state_lasts_longer_than_its_bound_with_offsets() -> None:
+    reached = shorter = total = 0
+    for seed in range(SETS // 3):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        placed, jitter = plain(random, most_period=12), random.choice((0, 0, 2))
+        placed = Placed([replace(one, jitter_ns=jitter) for one in placed.components], placed.grids)
+        without, with_them = placed.bounds()
+        machines = [
+            machine(execution("Run", bound_ms=one.states[0][1] / MS), name=one.name, priority=one.priority)
+            for one in placed.components
+        ]
+        members = []
+        for one, found in zip(placed.components, machines, strict=True):
+            job = replace(one.task.jobs[0], states=("Run",))
+            of_run = replace(found, offset_ns=placed.grids[one.name].offset_ns, overrun="catch_up")
+            members.append(Member(of_run, DigraphTask(one.name, (job,))))
+        longest = dict.fromkeys(with_them, 0)
+        cycles = run(members, OnTheGrid(random, jitter), most_jobs=300).cycles
+        for cycle in cycles:
+            for _, begin, end in cycle.states:
+                longest[cycle.component] = max(longest[cycle.component], end - begin)
+        for name, one in with_them.items():
+            if one.reason:
+                continue
+            assert longest[name] <= one.walls_ns["Run"] <= without[name].walls_ns["Run"], (seed, name)
+            total += 1
+            reached += longest[name] == one.walls_ns["Run"]
+            shorter += one.walls_ns["Run"] < without[name].walls_ns["Run"]
+    assert total > SETS / 2
+    assert reached > total / 3
+    assert shorter > total / 50
+
+
+def test_too_many_releases_leave_the_bound_without_offsets(monkeypatch: pytest.MonkeyPatch) -> None:
+    placed = Placed(
+        [Component(loop("low", 5, 10), 1), Component(loop("high", 4, 10), 2)],
+        {"low": Grid(10, 5), "high": Grid(10, 0)},
+    )
+    assert placed.bounds()[1]["low"].response_ns == 5
+    monkeypatch.setattr(module, "MOST_STEPS", 1)
+    without, with_them = placed.bounds()
+    assert with_them == without
+    assert with_them["low"].response_ns == 9
+
+
+def test_the_load_of_components_that_fill_the_processor() -> None:
+    """An offset leaves no backlog where the demand in a hyperperiod is all of it."""
+    full = Placed(
+        [Component(loop("low", 5, 10), 1), Component(loop("high", 5, 10), 2)],
+        {"low": Grid(10, 15), "high": Grid(10, 0)},
+    )
+    assert full.bounds()[1]["low"].response_ns == 5
 
 
 # ---- mistakes that the runs find
