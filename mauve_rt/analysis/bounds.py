@@ -111,8 +111,12 @@ def _with_offsets(
     subject: Subject, here: Sequence[Subject], without: DigraphTimes, wakeup_ns: int
 ) -> DigraphTimes:
     components = {each.name: component_of(each, jitter_ns=wakeup_ns) for each in here}
+    limits_ns = {state.name: state.limit_ns for state in subject.machine.states}
+    own = components[subject.name]
+    states = [state for state in own.states if 0 < limits_ns[state[0]] < without.walls_ns[state[0]]]
+    components[subject.name] = own = replace(own, states=tuple(states))  # the bounds of others do
     grids = {each.name: grid for each in here if (grid := grid_of(each.machine)) is not None}
-    return times_with_offsets(components[subject.name], [*components.values()], grids, without)
+    return times_with_offsets(own, [*components.values()], grids, without)
 
 
 def grid_of(machine: Machine) -> Grid | None:

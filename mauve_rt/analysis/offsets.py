@@ -44,7 +44,7 @@ Grids = Mapping[str, Grid]
 def times_with_offsets(
     one: Component, components: Sequence[Component], grids: Grids, without: DigraphTimes
 ) -> DigraphTimes:
-    """The bounds of a component, which are never above those `without` offsets.
+    """The bounds of a component and of its states, which are never above those `without` offsets.
 
     The longest `jitter_ns` of all components counts for each of them.
     """
@@ -55,23 +55,28 @@ def times_with_offsets(
     if without.reason or len(level) <= 1 or releases > MOST_STEPS:
         return without
     jitter_ns = max(each.jitter_ns for each in (one, *higher, *equal))
-    parts = [_Work(each, grids, hyperperiod_ns) for each in (higher, equal)]
-    own = _Own(one, grids.get(one.name))
-    windows = _Windows(own, *parts, without.blocking_ns, jitter_ns, hyperperiod_ns)
+    windows = _Windows(
+        _Own(one, grids.get(one.name)),
+        _Work(higher, grids, hyperperiod_ns),
+        _Work(equal, grids, hyperperiod_ns),
+        without.blocking_ns,
+        jitter_ns,
+        hyperperiod_ns,
+    )
     try:
         longest = windows.longest_ns()
         responses_ns = {
             each.job: min(each.response_ns, longest.get(each.job, each.response_ns)) for each in without.jobs
         }
         response_ns = max(responses_ns.values(), default=0)
-        walls_ns = {
-            name: min(without.walls_ns[name], windows.wall_ns(cost_ns, response_ns))
-            for name, cost_ns in one.states
-        }
+        walls_ns = {name: windows.wall_ns(cost_ns, response_ns) for name, cost_ns in one.states}
     except UnboundedError:
         return without
     jobs = tuple(JobTime(job, job_ns) for job, job_ns in responses_ns.items())
-    return replace(without, jobs=jobs, walls_ns=walls_ns)
+    shorter_ns = {
+        name: min(wall_ns, walls_ns.get(name, wall_ns)) for name, wall_ns in without.walls_ns.items()
+    }
+    return replace(without, jobs=jobs, walls_ns=shorter_ns)
 
 
 class _Work:
@@ -188,12 +193,13 @@ class _Windows:
     def _responses(self, first_ns: int) -> Iterator[tuple[Job, int]]:
         """Of the jobs in the window that begins with the releases of instants from `first_ns` on."""
         begin_ns, anchor_ns = first_ns + self.jitter_ns, self.own.anchor_ns(first_ns)
+        before_ns = anchor_ns - begin_ns  # any other work
+        if before_ns > 0 and self._others_ns(first_ns, anchor_ns) <= before_ns:
+            return  # the window ends before a job arrives
         length_ns = least_time_ns(
             lambda time_ns: (
-                self.blocking_ns
-                + self.own.demand.in_ns(begin_ns + time_ns - anchor_ns)
-                + self.higher.in_ns(first_ns, begin_ns + time_ns)
-                + self.equal.in_ns(first_ns, begin_ns + time_ns)
+                self.own.demand.in_ns(begin_ns + time_ns - anchor_ns)
+                + self._others_ns(first_ns, begin_ns + time_ns)
             ),
             1,
         )
@@ -202,18 +208,19 @@ class _Windows:
             finish_ns = begin_ns + self._finish_ns(first_ns, path)
             yield path.job, finish_ns - anchor_ns - path.release_ns
 
+    def _others_ns(self, first_ns: int, end_ns: int) -> int:
+        """What arrives of others in the half-open interval, and blocking."""
+        others_ns = self.higher.in_ns(first_ns, end_ns) + self.equal.in_ns(first_ns, end_ns)
+        return self.blocking_ns + others_ns
+
     def _finish_ns(self, first_ns: int, path: Path) -> int:
         """When the last job of the path is done, from the begin of the window on."""
         begin_ns, equal_ns = first_ns + self.jitter_ns, 0
         if self.equal.components:
-            before_ns = self.blocking_ns + path.work_ns - cost_of(path.job)
+            before_ns = path.work_ns - cost_of(path.job)
             start_ns = least_time_ns(
-                lambda time_ns: (
-                    before_ns
-                    + self.higher.in_ns(first_ns, begin_ns + time_ns + 1)
-                    + self.equal.in_ns(first_ns, begin_ns + time_ns + 1)
-                ),
-                before_ns,
+                lambda time_ns: before_ns + self._others_ns(first_ns, begin_ns + time_ns + 1),
+                self.blocking_ns + before_ns,
             )
             equal_ns = self.equal.in_ns(first_ns, begin_ns + start_ns + 1)
         return self._execution_ns(first_ns, path.work_ns + equal_ns)
@@ -229,15 +236,20 @@ class _Windows:
 
         Where it begins, no component of higher priority has work.
         """
-        begins = [*self._begins(response_ns - cost_ns)] or [self.jitter_ns]
-        return max(self._execution_ns(begin_ns - self.jitter_ns, cost_ns) for begin_ns in begins)
+        longest_ns = 0
+        for begin_ns in self._begins(response_ns - cost_ns):
+            first_ns = begin_ns - self.jitter_ns
+            work_ns = self.blocking_ns + cost_ns + self.higher.in_ns(first_ns, begin_ns + longest_ns)
+            if work_ns > longest_ns:  # else it is no longer
+                longest_ns = max(longest_ns, self._execution_ns(first_ns, cost_ns))
+        return longest_ns
 
     def _begins(self, latest_ns: int) -> Iterator[int]:
         """The worst instants of executions that begin at most so long after the arrival of their jobs."""
         end_ns, grids = self.hyperperiod_ns, self.higher.grids
         firsts = sorted({first_ns for grid in grids for first_ns in _instants(grid, end_ns)})
         if self.own.grid is None:
-            yield from (first_ns + self.jitter_ns for first_ns in firsts)
+            yield from (first_ns + self.jitter_ns for first_ns in firsts or [0])
             return
         twice = [*firsts, *(end_ns + first_ns for first_ns in firsts)]
         for arrival_ns in _instants(self.own.grid, end_ns):

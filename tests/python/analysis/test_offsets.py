@@ -293,7 +293,11 @@ def every_release_at_its_instant(windows: module._Windows, first_ns: int) -> Ite
 def only_jobs_of_own_instants(windows: module._Windows) -> Iterator[int]:
     """As if each job began a window: nothing is left of work that was released before."""
     grid = windows.own.grid
-    return FIRSTS(windows) if grid is None else iter(range(grid.offset_ns, windows.hyperperiod_ns, grid.period_ns))
+    return (
+        FIRSTS(windows)
+        if grid is None
+        else iter(range(grid.offset_ns, windows.hyperperiod_ns, grid.period_ns))
+    )
 
 
 RESPONSES, FIRSTS = module._Windows._responses, module._Windows._firsts
