@@ -165,7 +165,7 @@ def test_each_bound_is_the_longest_response_of_a_run(*, late: bool, threads: boo
         responses = [one.response_ns for one in without.values()]
         if not grids or None in responses:
             continue
-        longest = longest_of_all(placed, 2 * max(one or 0 for one in responses) + 1)
+        longest = longest_of_all(placed, 3 * placed.hyperperiod)
         for name, one in with_them.items():
             assert one.response_ns is not None
             if len(grids) > 1:
