@@ -194,7 +194,7 @@ def test_no_run_is_above_a_bound_with_offsets() -> None:
 
 
 def test_random_sets_are_schedulable_only_with_offsets() -> None:
-    """About one of ten sets of two to five components whose deadlines are their periods."""
+    """About 8 % of sets of two to five components: each deadline is the period, offsets are random."""
     only = 0
     for seed in range(SETS):
         placed = plain(Random(seed))  # noqa: S311 - not for secrets
