@@ -9,6 +9,7 @@ from mauve_rt.analysis.digraph import DigraphTask, digraph_of, period_of
 from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime, digraph_times
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 from mauve_rt.analysis.obstacles import obstacles
+from mauve_rt.analysis.offsets import Grid, times_with_offsets
 
 
 @dataclass(frozen=True)
@@ -47,6 +48,9 @@ class Subject:
         )
 
 
+OFFSETS = "offsets"
+
+
 @dataclass(frozen=True)
 class Bound:
     """Of the jobs of a component."""
@@ -64,6 +68,13 @@ class Bound:
     """Of each execution state the longest time from its begin to its end."""
     too_long: tuple[str, ...] = ()
     """What may last beyond its wall-clock bound, in words."""
+    by: str = ""
+    """OFFSETS: it holds while components keep their offsets; empty: it holds for any offsets."""
+
+    @property
+    def how(self) -> str:
+        """As ` (with offsets)`, to stand behind the bound."""
+        return f" (with {self.by})" if self.by else ""
 
     @property
     def meets_deadline(self) -> bool:
@@ -73,19 +84,50 @@ class Bound:
 
 
 def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, Bound]:
-    """The bound of each component.
+    """The bound of each component; where a deadline would not be met without offsets, with them.
 
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
     """
     times: dict[str, DigraphTimes] = {}
+    levels: dict[str, list[Subject]] = {}
     for here in by_cpu(subjects):
         found = digraph_times([component_of(subject, jitter_ns=wakeup_ns) for subject in here])
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
-    return {
-        subject.name: bound_of(subject, subjects, times)
-        for subject in subjects
-        if subject.machine.is_component
-    }
+        levels |= {subject.name: here for subject in here}
+    bounds: dict[str, Bound] = {}
+    for subject in subjects:
+        if not subject.machine.is_component:
+            continue
+        bound = bound_of(subject, subjects, times)
+        if bound.response_ns is not None and not bound.meets_deadline:
+            shorter = _with_offsets(subject, levels[subject.name], times[subject.name], wakeup_ns)
+            if shorter != times[subject.name]:
+                bound = replace(bound_of(subject, subjects, {**times, subject.name: shorter}), by=OFFSETS)
+        bounds[subject.name] = bound
+    return bounds
+
+
+def _with_offsets(
+    subject: Subject, here: Sequence[Subject], without: DigraphTimes, wakeup_ns: int
+) -> DigraphTimes:
+    components = {each.name: component_of(each, jitter_ns=wakeup_ns) for each in here}
+    limits_ns = {state.name: state.limit_ns for state in subject.machine.states}
+    own = components[subject.name]
+    states = [state for state in own.states if 0 < limits_ns[state[0]] < without.walls_ns[state[0]]]
+    components[subject.name] = own = replace(own, states=tuple(states))  # the bounds of others do
+    grids = {each.name: grid for each in here if (grid := grid_of(each.machine)) is not None}
+    return times_with_offsets(own, [*components.values()], grids, without)
+
+
+def grid_of(machine: Machine) -> Grid | None:
+    """At which instants its jobs arrive; None: no grid has them all."""
+    if not machine.is_component or not machine.period_ns:
+        return None
+    waits = [state for state in machine.states if state.is_wait]
+    spacings_ns = [wait.separation_ns for wait in waits if wait.separation_ns != FOREVER_NS]
+    if any(wait.is_event_wait for wait in waits) or any(ns % machine.period_ns for ns in spacings_ns):
+        return None
+    return Grid(machine.period_ns, machine.offset_ns)
 
 
 def component_of(subject: Subject, *, jitter_ns: int) -> Component:

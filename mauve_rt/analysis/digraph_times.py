@@ -125,10 +125,7 @@ def _times(
     demands: Mapping[str, Demand],
     loads: Mapping[str, Fraction],
 ) -> DigraphTimes:
-    higher = [other for other in components if other.priority > one.priority]
-    equal = [other for other in components if other.priority == one.priority and other is not one]
-    if one.waits_for_services or shares_a_resource(one, components):
-        higher, equal = [*higher, *equal], []
+    higher, equal = level_of(one, components)
     level = (one, *higher, *equal)
     load = sum((loads[each.name] for each in level), start=Fraction(0))
     blocked_ns = blocking_ns(one, components)
@@ -153,6 +150,17 @@ def _times(
         return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
     jobs = tuple(JobTime(job, longest[job]) for job in one.task.jobs)
     return DigraphTimes(jobs, blocking_ns=blocked_ns, walls_ns=walls_ns)
+
+
+def level_of(
+    one: Component, components: Sequence[Component]
+) -> tuple[Sequence[Component], Sequence[Component]]:
+    """Which others count as of higher priority, and which as of equal priority."""
+    higher = [other for other in components if other.priority > one.priority]
+    equal = [other for other in components if other.priority == one.priority and other is not one]
+    if one.waits_for_services or shares_a_resource(one, components):
+        return [*higher, *equal], []
+    return higher, equal
 
 
 def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:

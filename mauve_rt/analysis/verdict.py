@@ -122,4 +122,5 @@ def _too_long(name: str, bound: Bound) -> str:
         return f"{name} has no bound ({bound.reason})"
     if bound.too_long:
         return f"{name}: {'; '.join(bound.too_long)}"
-    return f"{name} has a bound of {in_ms(bound.response_ns)} and a deadline of {in_ms(bound.deadline_ns)}"
+    found = f"{in_ms(bound.response_ns)}{bound.how}"
+    return f"{name} has a bound of {found} and a deadline of {in_ms(bound.deadline_ns)}"

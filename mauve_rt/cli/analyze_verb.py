@@ -111,6 +111,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def main(args: argparse.Namespace) -> int:
     """Print the model and the verdict; returns the exit status."""
+    from mauve_rt.analysis.bounds import OFFSETS  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.study import study  # noqa: PLC0415
@@ -140,6 +141,8 @@ def main(args: argparse.Namespace) -> int:
         f"the parts of {path} are written in C++, but for implementations with a module"
         for path in args.model
     ]
+    if any(bound.by == OFFSETS for bound in now.bounds.values()):
+        assumptions.append("components keep their offsets from the common epoch")
     plans: list[Plan] = []
     if args.plan is not None or args.alternatives:
         planner = Planner(found, now, components, surroundings)
@@ -265,7 +268,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
 
 
 def _response(bound: "Bound") -> dict[str, Any]:
-    names = ("response_ns", "deadline_ns", "reason", "blocking_ns", "too_long")
+    names = ("response_ns", "deadline_ns", "reason", "blocking_ns", "too_long", "by")
     return {name: getattr(bound, name) for name in names}
 
 

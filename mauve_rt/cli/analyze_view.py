@@ -127,7 +127,7 @@ def _response(bound: Bound) -> str:
     met = "met" if bound.meets_deadline else "not proved to be met"
     blocked = f", blocked up to {in_ms(bound.blocking_ns)}" if bound.blocking_ns else ""
     deadline = f"its deadline of {in_ms(bound.deadline_ns)} is {met}"
-    return f"at most {in_ms(bound.response_ns)}, {deadline}{blocked}"
+    return f"at most {in_ms(bound.response_ns)}{bound.how}, {deadline}{blocked}"
 
 
 def _job(job: Job) -> str:

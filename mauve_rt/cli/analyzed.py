@@ -85,6 +85,10 @@ def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:
         )
         for part in architecture.components()
     ]
+    machines = [
+        replace(machine, period_ns=machine.period_ns or model.components[machine.name].period_ns)
+        for machine in machines
+    ]
     if models:
         machines = [
             machine if machine.is_python else machine.without_locks(_wait_free(part, kinds))

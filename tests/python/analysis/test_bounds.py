@@ -3,14 +3,16 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
-from analysis_machines import MS, connected, execution, machine, wait
+from analysis_machines import MS, connected, event, execution, machine, wait
 from schedule_simulation import LOCK, RUN, UNLOCK, WAIT, Release, simulate
 
-from mauve_rt.analysis.bounds import Bound, Subject, bounds_of
+from mauve_rt.analysis.bounds import OFFSETS, Bound, Subject, bounds_of, grid_of
 from mauve_rt.analysis.digraph_times import Component
 from mauve_rt.analysis.locks import with_measured_holds
 from mauve_rt.analysis.machines import ExecutionTime, Hold, Machine
 from mauve_rt.analysis.obstacles import assumptions_about
+from mauve_rt.analysis.offsets import Grid
+from mauve_rt.analysis.plan import bounds_during
 from mauve_rt.analysis.threads import machines_of
 from mauve_rt.model.threads import ThreadInfo
 
@@ -353,3 +355,84 @@ def test_a_real_time_thread_delays_those_below_it_on_each_cpu_where_it_may_run()
     unknown = with_threads(components, ThreadInfo("topics_out", 70, (1,)))
     assert unknown["here"].response_ns == 1 * MS
     assert unknown["there"].reason == "topics_out may delay it, and nothing is proved of that"
+
+
+# ---- offsets
+
+
+def two(**low: object) -> tuple[Machine, Machine]:
+    """The lower one would miss its deadline without its offset."""
+    facts = {"priority": 50, "offset_ns": 5 * MS, "deadline_ns": 6 * MS, **low}
+    return loop("high", 4, 10, priority=60), loop("low", 5, 10, **facts)
+
+
+def test_offsets_count_where_a_deadline_would_not_be_met_without_them() -> None:
+    found = bounds(*two())
+    assert found == {"high": Bound(4 * MS, 10 * MS), "low": Bound(5 * MS, 6 * MS, by=OFFSETS)}
+    assert found["low"].meets_deadline
+    assert bounds(*two(deadline_ns=9 * MS))["low"] == Bound(9 * MS, 9 * MS), "true for any offsets"
+    assert bounds(*two(offset_ns=1005 * MS))["low"].response_ns == 5 * MS
+    assert bounds(*two(offset_ns=2 * MS))["low"] == Bound(7 * MS, 6 * MS, by=OFFSETS)
+
+
+def test_offsets_know_late_wake_ups_blocking_and_the_cost_of_a_release() -> None:
+    earlier = two(offset_ns=4 * MS)
+    assert bounds(*earlier, wakeup_ns=MS)["low"] == Bound(6 * MS, 6 * MS, by=OFFSETS)
+    late = bounds(*earlier, wakeup_ns=MS + 1)["low"]
+    assert (late.response_ns, late.by) == (10 * MS + 1, OFFSETS), "the next release of the higher one"
+    holder = loop("holder", 2, 100, priority=40, ports=connected(map=1))
+    found = bounds(*two(offset_ns=4 * MS, ports=connected(map=1)), holder)["low"]
+    assert found == Bound(6 * MS, 6 * MS, blocking_ns=1 * MS, by=OFFSETS)
+    machines = [replace(machine, deadline_ns=6 * MS) for machine in two()]
+    subjects = [Subject.of(one, overhead_ns=MS // 10) for one in machines]
+    assert bounds_of(subjects)["low"].response_ns == 92 * MS // 10
+
+
+def test_only_a_component_on_the_grid_of_the_epoch_has_an_offset() -> None:
+    high, low = two()
+    odd = machine(
+        execution("Run", "Short", wcet_ms=4, initial=True),
+        wait("Short", "Again", ms=3),
+        execution("Again", "Long", wcet_ms=0.001),
+        wait("Long", "Run", ms=7),
+        name="high",
+        priority=60,
+    )
+    sporadic = machine(
+        event("Await", "Run", least_ms=10, initial=True),
+        execution("Run", "Await", wcet_ms=4),
+        name="high",
+        priority=60,
+    )
+    beside = replace(high, is_component=False)
+    assert grid_of(Subject.of(high).machine) == Grid(10 * MS, 0)
+    for one in (odd, sporadic, beside):
+        assert grid_of(Subject.of(one).machine) is None
+        found = bounds(one, low)["low"]
+        assert (found.response_ns or 0) >= 9 * MS
+        assert not found.by
+    finer = replace(high, period_ns=5 * MS)
+    assert bounds(finer, low)["low"].response_ns == 9 * MS, "it may begin 5 ms later"
+
+
+def test_a_state_that_would_be_cut_off_without_offsets() -> None:
+    def with_limit(offset_ms: int) -> Bound:
+        low = machine(
+            execution("Run", "Pause", wcet_ms=5, bound_ms=6, initial=True),
+            wait("Pause", "Run", ms=10),
+            name="low",
+            offset_ns=offset_ms * MS,
+        )
+        return bounds(two()[0], low)["low"]
+
+    assert with_limit(5).meets_deadline
+    assert with_limit(5).by == OFFSETS
+    assert with_limit(8).too_long, "the higher one comes 2 ms later"
+
+
+def test_offsets_do_not_count_while_a_change_is_made() -> None:
+    before = [Subject.of(one) for one in two()]
+    after = [before[0], Subject.of(two(deadline_ns=7 * MS)[1])]
+    assert all(one.meets_deadline for each in (before, after) for one in bounds_of(each).values())
+    during = bounds_during(before, after, {})["low"]
+    assert (during.response_ns, during.by, during.meets_deadline) == (9 * MS, "", False)

@@ -59,12 +59,20 @@ def test_a_late_wake_up_is_named() -> None:
     assert "+ 0.500 ms until its thread begins" in verdict(loop("one", 9.8, 10, 50), wakeup_ns=MS // 2).why
 
 
-def test_an_offset_that_prevents_the_miss_leaves_it_not_proved() -> None:
+def test_an_offset_that_prevents_the_miss_proves_that_there_is_none() -> None:
     high, low = loop("high", 4, 10, 60), loop("low", 5, 10, 50, offset_ns=5 * MS, deadline_ns=6 * MS)
-    found = verdict(high, low)
-    assert found.outcome == Outcome.NOT_PROVED
+    assert verdict(high, low).outcome == Outcome.SCHEDULABLE
+    assert verdict(high, replace(low, offset_ns=0)).outcome == Outcome.NOT_SCHEDULABLE
+
+
+def test_a_bound_with_offsets_that_is_too_long_is_named_as_such() -> None:
+    """Blocking counts for each job, and no run has the lock held at that time."""
+    low = loop("low", 4, 10, 50, offset_ns=5 * MS, deadline_ns=MS * 9 // 2, ports=connected(map=3))
+    below = loop("below", 1, 40, 40, offset_ns=12 * MS, ports=connected(map=3))
+    found = verdict(loop("high", 3, 10, 60), low, below)
     assert found.why == (
-        "low has a bound of 9.000 ms and a deadline of 6.000 ms; none of 64 runs misses a deadline"
+        "low has a bound of 5.000 ms (with offsets) and a deadline of 4.500 ms; "
+        "none of 64 runs misses a deadline"
     )
 
 

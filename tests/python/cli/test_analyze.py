@@ -369,6 +369,7 @@ def test_the_latency_of_the_machine_is_in_the_bound(told: Callable[..., dict[str
         "reason": "",
         "blocking_ns": 0,
         "too_long": [],
+        "by": "",
     }
 
 
@@ -538,3 +539,29 @@ def test_a_robot_with_more_cpus_than_this_computer(analyze: Analyze) -> None:
     status, out, err = analyze(PAIR.replace("priority: 30, cpus: [0]", "priority: 30, cpus: [61]"))
     assert (status, err) == (0, "")
     assert "slow: CPU 61, priority 30" in out
+
+
+WITH_OFFSET = PAIR.replace("13950000", "5000000").replace(
+    "properties: {period_ms: 20}", "offset_ms: 4, deadline_ns: 6000000, properties: {period_ms: 20}"
+)
+OWN_PERIOD = "period_ns: 5000000, properties: {period_ms: 10}"
+
+
+def test_a_bound_with_offsets_is_said_to_be_one(analyze: Analyze) -> None:
+    status, out, err = analyze(WITH_OFFSET)
+    assert (status, err) == (0, "")
+    assert "  response at most 5.000 ms (with offsets), its deadline of 6.000 ms is met\n" in out
+    condition = "components keep their offsets from the common epoch"
+    assert f"  {condition}\n" in out
+    told = json.loads(analyze(WITH_OFFSET, "--json")[1])
+    assert [one["response"]["by"] for one in told["components"]] == ["", "offsets"]
+    assert condition in told["assumptions"]
+    status, out, _ = analyze(WITH_OFFSET.replace("deadline_ns: 6000000", "deadline_ns: 20000000"))
+    assert (status, condition in out) == (0, False), out
+
+
+def test_a_declared_period_makes_the_grid_finer(analyze: Analyze) -> None:
+    """After a start the component may begin at any of its instants."""
+    status, out, _ = analyze(WITH_OFFSET.replace("properties: {period_ms: 10}", OWN_PERIOD))
+    assert status == 3
+    assert "period 5.000 ms" in out
