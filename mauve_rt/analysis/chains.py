@@ -210,4 +210,4 @@ def assumptions_of(routes: Sequence[Route], channels: Mapping[str, Channel]) -> 
         yield f"the readers of {', '.join(unknown)} get the newest value (nothing here says the kind)"
     ends = {name for route in routes for name in (route.channels[0], route.channels[-1])}
     if topics := sorted({topic for name in ends if name in channels for topic in channels[name].topics}):
-        yield f"the time on the topic is not counted: {', '.join(topics)}"
+        yield f"no time passes on {', '.join(topics)}: the transport is not counted"

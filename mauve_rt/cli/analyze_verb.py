@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Bound, Subject
     from mauve_rt.analysis.machines import Machine
     from mauve_rt.analysis.study import Study, Surroundings
+    from mauve_rt.cli.analyze_chains import JudgedChain
     from mauve_rt.cli.analyze_plan import Plan
     from mauve_rt.cli.analyzed import Analyzed
 
@@ -106,6 +107,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="judge each alternative and fallback core of an architecture FILE, too",
     )
+    parser.add_argument(
+        "--chain",
+        action="append",
+        default=[],
+        metavar="FROM:TO",
+        help="bound the reaction time and the data age from a component, port (COMPONENT.PORT), resource or "
+        "topic to another one, and measure both in a bag; may be repeated",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -145,8 +154,17 @@ def main(args: argparse.Namespace) -> int:
         planner = Planner(found, now, components, surroundings)
         plans += planner.of_file(args.plan) if args.plan is not None else ()
         plans += planner.alternatives() if args.alternatives else ()
+    chains: list[JudgedChain] = []
+    if args.chain:
+        from mauve_rt.cli.analyze_chains import chain_json, judged_chains, print_chain  # noqa: PLC0415
+        from mauve_rt.cli.chain_routes import Wiring  # noqa: PLC0415
+
+        wiring = Wiring.of(found.described, found.channels)
+        chains = judged_chains(args.chain, wiring, now, wakeup_ns=surroundings.wakeup_ns, bag=bag)
     if args.json:
         told = _as_json(now, surroundings, assumptions)
+        if args.chain:
+            told["chains"] = [chain_json(chain) for chain in chains]
         if args.plan is not None or args.alternatives:
             told["changes"] = [_plan_json(plan) for plan in plans]
         print(json.dumps(told, indent=2))
@@ -161,6 +179,8 @@ def main(args: argparse.Namespace) -> int:
         print_verdict(now, assumptions)
         for plan in plans:
             print_plan(plan)
+        for chain in chains:
+            print_chain(chain)
     if now.verdict.witness is not None and args.witness is not None:
         from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
 
@@ -168,7 +188,7 @@ def main(args: argparse.Namespace) -> int:
         write_witness(args.witness, machines, now.verdict.witness)
         print(f"{args.witness}: a bag of that run; mauve report {args.witness} opens at it", file=sys.stderr)
     studies = [now, *(each for plan in plans for each in (plan.during, plan.after))]
-    outcomes = {each.verdict.outcome.name for each in studies}
+    outcomes = {each.verdict.outcome.name for each in studies} | {each.outcome.name for each in chains}
     return next(status for name, status in _STATUSES.items() if name in outcomes)
 
 

@@ -78,7 +78,8 @@ class Wiring:
             raise ParameterError(f"--chain: expected FROM:TO as scan:command, found {chain}")
         begins, finishes = (self._nodes(chain, end) for end in ends)
         if begins & finishes:
-            raise ParameterError(f"--chain {chain}: begin and end are the same; name two ends")
+            both = ", ".join(f"{kind} {name}" for kind, name in sorted(begins & finishes))
+            raise ParameterError(f"--chain {chain}: expected two ends, found {both} as both; name another end")
         graph: nx.DiGraph[_Node] = nx.DiGraph()
         graph.add_nodes_from(begins | finishes)
         graph.add_edges_from(port.edge for port in self.ports)
