@@ -67,20 +67,25 @@ def test_a_chain_of_resources_begins_at_the_reader(analyze: Analyze) -> None:
 
 
 def test_the_longest_of_several_routes_counts(analyze: Analyze) -> None:
-    text = CHAIN.replace("components:\n", f"components:\n  third: {{{PARTS}, priority: 20, cpus: [2], "
-        "properties: {period_ms: 30}, states: {Count: {wcet_ns: 1000000}}}\n").replace(
-        "connections:\n", "connections:\n  - [third.set, given.read]\n  - [third.count, result.write]\n"
+    third = f"{PARTS}, priority: 35, cpus: [1], properties: {{period_ms: 30}}, states: {{Count: {{wcet_ns: 1000000}}}}"
+    text = (
+        CHAIN.replace("components:\n", f"components:\n  third: {{{third}}}\n")
+        .replace("5000000", "4000000")
+        .replace("result: {kind: latest_value", "result: {kind: shared_data, longest_hold_ns: 1000")
+        .replace("connections:\n", "connections:\n  - [third.set, given.read]\n  - [third.count, result.write]\n")
     )
-    status, out, _ = analyze(text, "--chain", "given:result")
+    status, out, err = analyze(text, "--chain", "given:result")
+    assert err == ""
     assert status == 0
     assert f"\ngiven:result: reaction at most 38.000 ms, data age {BOTH}" in out
     assert f"  given -> quick -> between -> slow -> result: reaction at most 38.000 ms, data age {BOTH}" in out
-    assert "  given -> third -> result: reaction at most 31.000 ms, " in out
-    missing = text.replace("wcet_ns: 1000000", "")
-    status, out, _ = analyze(missing, "--chain", "given:result", "--chain", "between:result")
+    assert "  given -> third -> result: reaction at most 31.001 ms, " in out, "slow may hold the lock"
+    missing = text.replace(", states: {Count: {wcet_ns: 1000000}}", "")
+    status, out, _ = analyze(missing, "--chain", "given:result", "--chain", "given:between")
     assert status == 3
-    assert "\ngiven:result: not provable: no bound of reaction and data age\n  third has no response" in out
-    assert "\nbetween:result: reaction at most 25.000 ms" in out, "third is not in it"
+    assert "\ngiven:result: not provable: no bound of reaction and data age\n  " in out
+    assert "\n  third has no response bound: it is not provable\n" in out
+    assert "\ngiven:between: reaction at most 13.000 ms" in out, "neither is in it"
 
 
 @pytest.mark.parametrize(
@@ -121,8 +126,8 @@ def test_a_queue_and_a_second_writer(analyze: Analyze) -> None:
     status, out, _ = analyze(one_cpu.replace(kind, queue), "--chain", "given:result")
     assert status == 3
     assert "  between refuses values when it is full: set overwrite to true\n" in out
-    topic = f"{kind}, topic: {{name: other, direction: subscribe}}"
-    status, out, _ = analyze(CHAIN.replace(kind, topic), "--chain", "given:result")
+    topic = f"{queue}, topic: {{name: other, direction: subscribe}}".replace("ring_buffer, capacity: 4", "shared_data")
+    status, out, _ = analyze(one_cpu.replace(kind, topic), "--chain", "given:result")
     assert status == 3
     assert "  between has more writers (/robot/other): they may hide a value of the chain\n" in out
 
