@@ -113,7 +113,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar="FROM:TO",
         help="bound the reaction time and the data age from a component, port (COMPONENT.PORT), resource or "
-        "topic to another one, and measure both in a bag; may be repeated",
+        "topic to another one by each route, or by one route (FROM:STEP:...:TO), and measure both in a bag; "
+        "may be repeated",
     )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 

@@ -3,7 +3,7 @@
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from itertools import islice
+from itertools import islice, pairwise
 from typing import Any
 
 import networkx as nx
@@ -68,35 +68,44 @@ class Wiring:
         return cls(tuple(one.name for one in described), tuple(ports), found)
 
     def routes(self, chain: str) -> list[Route]:
-        """Each way without a loop from the one end to the other.
+        """Each way without a loop from the one end to the other; of more than two names, each is the next step.
 
         Raises:
             ParameterError: a name is unknown, or there is no way, or there are too many.
         """
-        ends = chain.split(":")
-        if len(ends) != len(("from", "to")) or not all(ends):
-            raise ParameterError(f"--chain: expected FROM:TO as scan:command, found {chain}")
-        begins, finishes = (self._nodes(chain, end) for end in ends)
+        names = chain.split(":")
+        if len(names) < len(("from", "to")) or not all(names):
+            raise ParameterError(
+                f"--chain: expected FROM:TO as scan:command, or each step of one route as "
+                f"scan:control:command, found {chain}"
+            )
+        steps = [self._nodes(chain, name) for name in names]
+        begins, finishes = steps[0], steps[-1]
         if begins & finishes:
             both = ", ".join(f"{kind} {name}" for kind, name in sorted(begins & finishes))
             raise ParameterError(f"--chain {chain}: expected two ends, found {both} as both; name another end")
         graph: nx.DiGraph[_Node] = nx.DiGraph()
         graph.add_nodes_from(begins | finishes)
         graph.add_edges_from(port.edge for port in self.ports)
+        is_direct = len(steps) > len(("from", "to"))
         ways = (
             way
             for begin in sorted(begins)
             for finish in sorted(finishes)
-            for way in nx.all_simple_paths(graph, begin, finish)
+            for way in nx.all_simple_paths(graph, begin, finish, 2 * len(steps) if is_direct else None)
+            if not is_direct or _follows(way, steps)
         )
-        routes = list(islice(self._through_ports(ends, ways), _MOST_ROUTES + 1))
+        routes = list(islice(self._through_ports(names, ways), _MOST_ROUTES + 1))
         if not routes:
             back = any(nx.has_path(graph, finish, begin) for begin in begins for finish in finishes)
-            remedy = f"the data goes the other way: write {ends[1]}:{ends[0]}" if back else "see mauve graph"
-            raise ParameterError(f"--chain {chain}: no data goes from {ends[0]} to {ends[1]}; {remedy}")
+            remedy = f"the data goes the other way: write {':'.join(reversed(names))}" if back else "see mauve graph"
+            direct = " by these steps" if is_direct else ""
+            raise ParameterError(
+                f"--chain {chain}: no data goes from {names[0]} to {names[-1]}{direct}; {remedy}"
+            )
         if len(routes) > _MOST_ROUTES:
             raise ParameterError(
-                f"--chain {chain}: more than {_MOST_ROUTES:,} routes; name a chain with nearer ends"
+                f"--chain {chain}: more than {_MOST_ROUTES:,} routes; name each step of one route"
             )
         return routes
 
@@ -114,23 +123,28 @@ class Wiring:
             )
         return found
 
-    def _through_ports(self, ends: list[str], ways: Iterable[list[_Node]]) -> Iterator[Route]:
-        """Of these ways those that go through the ports that are named; a port may stand outside a way."""
-        named = [{port.edge for port in self.ports if _named(port) == end} for end in ends]
+    def _through_ports(self, names: list[str], ways: Iterable[list[_Node]]) -> Iterator[Route]:
+        """Of these ways those that go through the ports that are named; at an end a port may lead outside."""
+        named = [{port.edge for port in self.ports if _named(port) == name} for name in names]
         for way in ways:
-            edges = list(zip(way, way[1:], strict=False))
-            outer = [
-                [edge for edge in named[0] if edge[1] == way[0]],
-                [edge for edge in named[1] if edge[0] == way[-1]],
-            ]
-            inner = edges[:1], edges[-1:]
-            if any(
-                named[side] and not outer[side] and not named[side] & {*inner[side]} for side in (0, 1)
-            ):
+            edges = {*pairwise(way)}
+            before = sorted(edge for edge in named[0] if edge[1] == way[0])
+            behind = sorted(edge for edge in named[-1] if edge[0] == way[-1])
+            edges |= {*before, *behind}
+            if any(ports and not ports & edges for ports in named):
                 continue
-            whole = [*(edge[0] for edge in outer[0][:1]), *way, *(edge[1] for edge in outer[1][:1])]
-            if route := _route(whole):
+            if route := _route([*(edge[0] for edge in before), *way, *(edge[1] for edge in behind)]):
                 yield route
+
+
+def _follows(way: list[_Node], steps: list[set[_Node]]) -> bool:
+    """Whether each step is the next node, or the next but one."""
+    at = 0
+    for step in steps[1:]:
+        at += 1 if at + 1 < len(way) and way[at + 1] in step else 2
+        if at >= len(way) or way[at] not in step:
+            return False
+    return at == len(way) - 1
 
 
 def _route(way: list[_Node]) -> Route | None:

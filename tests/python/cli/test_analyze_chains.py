@@ -50,14 +50,24 @@ BOTH = "at most 38.000 ms: quick 10.000 + 3.000 ms, slow 20.000 + 5.000 ms\n"
 
 @pytest.mark.parametrize(
     "chain",
-    ["given:result", "/robot/given:result", "quick:slow", "quick.set:slow.count", "quick.count:slow.set"],
+    [
+        "given:result",
+        "/robot/given:result",
+        "quick:slow",
+        "quick.set:slow.count",
+        "quick.count:slow.set",
+        "given:quick:slow:result",
+        "given:between:result",
+        "quick:between:slow.set:result",
+    ],
 )
 def test_a_chain_from_each_kind_of_end(analyze: Analyze, chain: str) -> None:
     status, out, err = analyze(CHAIN, "--chain", chain)
     assert (status, err) == (0, "")
     assert f"\n{chain}: reaction at most 38.000 ms, data age {BOTH}" in out
     assert "  if each job of a member reads its input and then writes its output; " in out
-    assert ("  if no time passes on /robot/given: " in out) == (chain.split(":")[0] not in ("quick", "quick.count"))
+    begins_at_topic = chain.startswith(("given:", "/robot/given:", "quick.set:"))
+    assert ("  if no time passes on /robot/given: " in out) == begins_at_topic
 
 
 def test_a_chain_of_resources_begins_at_the_reader(analyze: Analyze) -> None:
@@ -80,6 +90,8 @@ def test_the_longest_of_several_routes_counts(analyze: Analyze) -> None:
     assert f"\ngiven:result: reaction at most 38.000 ms, data age {BOTH}" in out
     assert f"  given -> quick -> between -> slow -> result: reaction at most 38.000 ms, data age {BOTH}" in out
     assert "  given -> third -> result: reaction at most 31.001 ms, " in out, "slow may hold the lock"
+    _, out, _ = analyze(text, "--chain", "given:third:result")
+    assert "\ngiven:third:result: reaction at most 31.001 ms, " in out, "that route alone"
     missing = text.replace(", states: {Count: {wcet_ns: 1000000}}", "")
     status, out, _ = analyze(missing, "--chain", "given:result", "--chain", "given:between")
     assert status == 3
@@ -88,11 +100,19 @@ def test_the_longest_of_several_routes_counts(analyze: Analyze) -> None:
     assert "\ngiven:between: reaction at most 13.000 ms" in out, "neither is in it"
 
 
+FORM = "--chain: expected FROM:TO as scan:command, or each step of one route as scan:control:command"
+
+
 @pytest.mark.parametrize(
     ("chain", "error"),
     [
-        ("given", "--chain: expected FROM:TO as scan:command, found given"),
-        ("given:", "--chain: expected FROM:TO as scan:command, found given:"),
+        ("given", f"{FORM}, found given"),
+        ("given:", f"{FORM}, found given:"),
+        ("given::result", f"{FORM}, found given::result"),
+        (
+            "given:slow:result",
+            "--chain given:slow:result: no data goes from given to result by these steps; see mauve graph",
+        ),
         (
             "given:reslt",
             "--chain given:reslt: expected a component, a port, a resource or a topic, found reslt; "
