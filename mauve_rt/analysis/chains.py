@@ -160,7 +160,9 @@ def _why_unbounded(subject: Subject, bound: Bound) -> Iterator[str]:
     catches_up = subject.machine.overrun == "catch_up"
     for one in bound.jobs:
         if one.response_ns > one.job.separation_ns and not catches_up:
-            took = f"a response of {in_ms(one.response_ns)} and {in_ms(one.job.separation_ns)} to the next one"
+            took = (
+                f"a response of {in_ms(one.response_ns)} and {in_ms(one.job.separation_ns)} to the next one"
+            )
             yield f"{name} may miss a release: a job has {took}"
             break
 
@@ -199,7 +201,8 @@ def _why_lost_in(queue: Channel) -> Iterator[str]:
     elif not queue.overwrites:
         yield f"{queue.name} refuses values when it is full: set overwrite to true"
     if len(queue.readers) > 1:
-        yield f"{queue.name} has several readers ({', '.join(queue.readers)}): each takes values of the others"
+        names = ", ".join(queue.readers)
+        yield f"{queue.name} has several readers ({names}): each takes values of the others"
 
 
 def assumptions_of(routes: Sequence[Route], channels: Mapping[str, Channel]) -> Iterator[str]:

@@ -126,10 +126,9 @@ def _lines(chain: JudgedChain) -> Iterator[str]:
         elif len(chain.routes) > 1 or chain.longest_ns is None:
             yield f"  route {one.bound.route}"
         if one.measured is not None:
-            yield from (
-                f"    measured {words}: {_distribution(getattr(one.measured, name), one.waits_in_queues)}"
-                for name, words in _FIGURES.items()
-            )
+            measured = "at least, without the time in a queue, " if one.waits_in_queues else ""
+            for name, words in _FIGURES.items():
+                yield f"    measured {words}: {measured}{_distribution(getattr(one.measured, name))}"
     if chain.contradictions:
         yield f"  model refuted: {'; '.join(chain.contradictions)}"
     if chain.longest_ns is not None:
@@ -142,12 +141,11 @@ def _bound(bound: RouteBound) -> str:
     return f"reaction at most {longest}, data age at most {longest}: {terms}"
 
 
-def _distribution(found: Distribution, waits_in_queues: bool) -> str:
+def _distribution(found: Distribution) -> str:
     if not found.count:
         return "not seen from begin to end"
-    least = "at least, without the time in a queue, " if waits_in_queues else ""
     figures = {"min": found.min_ns, "median": found.p50_ns, "99 %": found.p99_ns, "max": found.max_ns}
-    return f"{least}{', '.join(f'{name} {in_ms(ns)}' for name, ns in figures.items())} (n = {found.count:,})"
+    return f"{', '.join(f'{name} {in_ms(ns)}' for name, ns in figures.items())} (n = {found.count:,})"
 
 
 def chain_json(chain: JudgedChain) -> dict[str, Any]:

@@ -124,7 +124,6 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.study import study  # noqa: PLC0415
-    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
     from mauve_rt.cli.analyzed import analyzed  # noqa: PLC0415
     from mauve_rt.cli.measured_times import budgets_of, measured_of, statistics_of  # noqa: PLC0415
     from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
@@ -150,38 +149,13 @@ def main(args: argparse.Namespace) -> int:
         f"the parts of {path} are written in C++, but for implementations with a module"
         for path in args.model
     ]
-    plans: list[Plan] = []
-    if args.plan is not None or args.alternatives:
-        planner = Planner(found, now, components, surroundings)
-        plans += planner.of_file(args.plan) if args.plan is not None else ()
-        plans += planner.alternatives() if args.alternatives else ()
-    chains: list[JudgedChain] = []
-    if args.chain:
-        from mauve_rt.cli.analyze_chains import chain_json, judged_chains, print_chain  # noqa: PLC0415
-        from mauve_rt.cli.chain_routes import Wiring  # noqa: PLC0415
-
-        wiring = Wiring.of(found.described, found.channels)
-        chains = judged_chains(args.chain, wiring, now, wakeup_ns=surroundings.wakeup_ns, bag=bag)
+    plans = _plans(args, found, now, components, surroundings)
+    chains = _chains(args, found, now, surroundings, bag)
     if args.json:
         told = _as_json(now, surroundings, assumptions)
-        if args.chain:
-            told["chains"] = [chain_json(chain) for chain in chains]
-        if args.plan is not None or args.alternatives:
-            told["changes"] = [_plan_json(plan) for plan in plans]
-        print(json.dumps(told, indent=2))
+        print(json.dumps({**told, **_asked_json(args, plans, chains)}, indent=2))
     else:
-        from mauve_rt.cli.analyze_view import (  # noqa: PLC0415
-            print_model,
-            print_plan,
-            print_verdict,
-        )
-
-        print_model(now, surroundings.threads)
-        print_verdict(now, assumptions)
-        for plan in plans:
-            print_plan(plan)
-        for chain in chains:
-            print_chain(chain)
+        _print(now, surroundings, assumptions, plans, chains)
     if now.verdict.witness is not None and args.witness is not None:
         from mauve_rt.cli.witness_bag import write_witness  # noqa: PLC0415
 
@@ -191,6 +165,60 @@ def main(args: argparse.Namespace) -> int:
     studies = [now, *(each for plan in plans for each in (plan.during, plan.after))]
     outcomes = {each.verdict.outcome.name for each in studies} | {each.outcome.name for each in chains}
     return next(status for name, status in _STATUSES.items() if name in outcomes)
+
+
+def _plans(
+    args: argparse.Namespace,
+    found: "Analyzed",
+    now: "Study",
+    components: "Sequence[Machine]",
+    surroundings: "Surroundings",
+) -> "list[Plan]":
+    """Of --plan and --alternatives."""
+    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
+
+    if args.plan is None and not args.alternatives:
+        return []
+    planner = Planner(found, now, components, surroundings)
+    plans = [*planner.of_file(args.plan)] if args.plan is not None else []
+    return [*plans, *planner.alternatives()] if args.alternatives else plans
+
+
+def _chains(
+    args: argparse.Namespace,
+    found: "Analyzed",
+    now: "Study",
+    surroundings: "Surroundings",
+    bag: Path | None,
+) -> "list[JudgedChain]":
+    """Of --chain."""
+    from mauve_rt.cli.analyze_chains import judged_chains  # noqa: PLC0415
+    from mauve_rt.cli.chain_routes import Wiring  # noqa: PLC0415
+
+    if not args.chain:
+        return []
+    wiring = Wiring.of(found.described, found.channels)
+    return judged_chains(args.chain, wiring, now, wakeup_ns=surroundings.wakeup_ns, bag=bag)
+
+
+def _print(
+    now: "Study",
+    surroundings: "Surroundings",
+    assumptions: Sequence[str],
+    plans: "Sequence[Plan]",
+    chains: "Sequence[JudgedChain]",
+) -> None:
+    from mauve_rt.cli.analyze_view import print_model, print_plan, print_verdict  # noqa: PLC0415
+
+    print_model(now, surroundings.threads)
+    print_verdict(now, assumptions)
+    for plan in plans:
+        print_plan(plan)
+    if chains:
+        from mauve_rt.cli.analyze_chains import print_chain  # noqa: PLC0415
+
+        for chain in chains:
+            print_chain(chain)
 
 
 _STATUSES = {
@@ -295,6 +323,18 @@ def _as_json(now: "Study", surroundings: "Surroundings", assumptions: Sequence[s
         "verdict": judged,
         "assumptions": assumptions,
     }
+
+
+def _asked_json(
+    args: argparse.Namespace, plans: "Sequence[Plan]", chains: "Sequence[JudgedChain]"
+) -> dict[str, Any]:
+    """Answers to --chain, --plan and --alternatives."""
+    from mauve_rt.cli.analyze_chains import chain_json  # noqa: PLC0415
+
+    found: dict[str, Any] = {"chains": [chain_json(chain) for chain in chains]} if args.chain else {}
+    if args.plan is not None or args.alternatives:
+        found["changes"] = [_plan_json(plan) for plan in plans]
+    return found
 
 
 def _plan_json(plan: "Plan") -> dict[str, Any]:

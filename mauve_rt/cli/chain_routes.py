@@ -68,7 +68,7 @@ class Wiring:
         return cls(tuple(one.name for one in described), tuple(ports), found)
 
     def routes(self, chain: str) -> list[Route]:
-        """Each way without a loop from the one end to the other; of more than two names, each is the next step.
+        """Each way without a loop from the first name to the last; of more than two, each is the next step.
 
         Raises:
             ParameterError: a name is unknown, or there is no way, or there are too many.
@@ -83,7 +83,9 @@ class Wiring:
         begins, finishes = steps[0], steps[-1]
         if begins & finishes:
             both = ", ".join(f"{kind} {name}" for kind, name in sorted(begins & finishes))
-            raise ParameterError(f"--chain {chain}: expected two ends, found {both} as both; name another end")
+            raise ParameterError(
+                f"--chain {chain}: expected two ends, found {both} as both; name another end"
+            )
         graph: nx.DiGraph[_Node] = nx.DiGraph()
         graph.add_nodes_from(begins | finishes)
         graph.add_edges_from(port.edge for port in self.ports)
@@ -98,7 +100,11 @@ class Wiring:
         routes = list(islice(self._through_ports(names, ways), _MOST_ROUTES + 1))
         if not routes:
             back = any(nx.has_path(graph, finish, begin) for begin in begins for finish in finishes)
-            remedy = f"the data goes the other way: write {':'.join(reversed(names))}" if back else "see mauve graph"
+            remedy = (
+                f"the data goes the other way: write {':'.join(reversed(names))}"
+                if back
+                else "see mauve graph"
+            )
             direct = " by these steps" if is_direct else ""
             raise ParameterError(
                 f"--chain {chain}: no data goes from {names[0]} to {names[-1]}{direct}; {remedy}"

@@ -1,8 +1,9 @@
-"""Bounds of chains: by hand, against simulated runs, with planted mistakes; and the reasons without a bound."""
+"""Bounds of chains: by hand, against simulated runs, with planted mistakes; reasons why there is none."""
 
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from random import Random
 from types import SimpleNamespace
 
@@ -51,7 +52,9 @@ def bound_of(*machines: Machine, channels: Sequence[Channel] = (), wakeup_ns: in
 
 
 def test_a_chain_waits_for_each_release_and_each_response() -> None:
-    found = bound_of(loop("a", 1, 10, 60, cpus=[0]), loop("b", 2, 20, 50, cpus=[1]), loop("c", 3, 30, cpus=[2]))
+    found = bound_of(
+        loop("a", 1, 10, 60, cpus=[0]), loop("b", 2, 20, 50, cpus=[1]), loop("c", 3, 30, cpus=[2])
+    )
     assert found.longest_ns == (10 + 1 + 20 + 2 + 30 + 3) * MS
     assert ", ".join(map(str, found.terms)) == (
         "a 10.000 + 1.000 ms, b 20.000 + 2.000 ms, c 30.000 + 3.000 ms"
@@ -80,7 +83,9 @@ def test_a_member_finishes_before_a_lower_one_on_its_cpu_begins() -> None:
         assert found.terms[0].counted_ns == found.terms[0].response_ns > 0
     assert bound_of(low, high).terms[0].counted_ns == 3 * MS
     calling = replace(high, clients=("lamp",))
-    assert bound_of(calling, low).terms[0].counted_ns == 2 * MS, "it leaves the CPU as it waits for the answer"
+    assert bound_of(calling, low).terms[0].counted_ns == 2 * MS, (
+        "it leaves the CPU as it waits for the answer"
+    )
 
 
 def test_a_member_that_waits_for_a_lock_of_a_thread_counts_with_its_response() -> None:
@@ -225,11 +230,7 @@ def longest_of_registers(run: Run, *, capacity: int = 0) -> tuple[int, int]:
             if member == len(run) - 1 and held[member] is not None and time <= end:
                 outputs.append((time, held[member] or 0))
     age = max(
-        (
-            time - before
-            for (_, before), (time, _) in zip(outputs, outputs[1:], strict=False)
-            if before >= start
-        ),
+        (time - before for (_, before), (time, _) in pairwise(outputs) if before >= start),
         default=0,
     )
     reactions = []
@@ -262,8 +263,9 @@ MISTAKES: dict[str, Change] = {
     "forgets the wait of the first member": _without(0, "wait_ns"),
     "forgets the wait of the last member": _without(-1, "wait_ns"),
     "forgets the response of the last member": _without(-1, "counted_ns"),
-    "forgets each other response": lambda bound: sum(one.wait_ns for one in bound.terms)
-    + bound.terms[-1].counted_ns,
+    "forgets each other response": lambda bound: (
+        sum(one.wait_ns for one in bound.terms) + bound.terms[-1].counted_ns
+    ),
     "counts half of each wait": lambda bound: sum(one.wait_ns // 2 + one.counted_ns for one in bound.terms),
 }
 

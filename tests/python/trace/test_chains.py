@@ -12,7 +12,7 @@ from mauve_rt.trace.recording.synthetic import SyntheticSource
 
 
 def two(*, count: int = 6, between: Callable[[SyntheticSource], None] | None = None) -> Trace:
-    """`a` every 10 ms for 2 ms, `b` every 20 ms for 5 ms, 1 ms later; `between` is called after half of `a`."""
+    """`a` every 10 ms for 2 ms, `b` every 20 ms for 5 ms, 1 ms later; `between`: after half of `a`."""
     source = SyntheticSource(["a", "b"])
     deploy(source, "a")
     deploy(source, "b")
