@@ -1,6 +1,5 @@
 """What the pages about the timing proof show is what `mauve analyze` prints."""
 
-import re
 import shlex
 from pathlib import Path
 
@@ -26,7 +25,7 @@ def test_the_commands_of_the_how_to_print_what_it_shows(
     shown = [text for text in texts if not text.startswith("mauve ")]
     for words, status, lines in zip((*commands[1:3], commands[4]), (0, 1, 0), shown, strict=True):
         assert main(words) == status
-        assert lines.rstrip("\n") in re.sub(r"(?<=ms:) ", "\n", capsys.readouterr().out)
+        assert " ".join(lines.split()) in " ".join(capsys.readouterr().out.split())
     assert main(commands[3]) == 0
     assert (tmp_path / "slow/report.html").stat().st_size > 0
 
