@@ -182,25 +182,26 @@ def _finishes_before(subject: Subject, follower: Subject, subjects: Iterable[Sub
 
 def _why_lost(route: Route, channels: Mapping[str, Channel]) -> Iterator[str]:
     """Why a value may not come through a channel of the route."""
-    for index, name in enumerate(route.channels[:-1]):
+    last = len(route.channels) - 1
+    for index, name in enumerate(route.channels):
         channel = channels.get(name)
         if channel is None:
             continue
         writers = [writer for writer in channel.writers if writer not in route.members[index - 1 : index]]
-        if index and writers:
+        if 0 < index < last and writers:
             yield f"{name} has more writers ({', '.join(writers)}): they may hide a value of the chain"
         if channel.is_queue:
-            yield from _why_lost_in(channel)
-        elif channel.kind and channel.kind not in _REGISTERS:
+            yield from _why_lost_in(channel, is_read=index < last)
+        elif channel.kind and channel.kind not in _REGISTERS and index < last:
             yield f"{name} is a {channel.kind}: nothing says when its readers get a value"
 
 
-def _why_lost_in(queue: Channel) -> Iterator[str]:
+def _why_lost_in(queue: Channel, *, is_read: bool) -> Iterator[str]:
     if not queue.capacity:
         yield f"nothing here says the capacity of the queue {queue.name}: analyze the architecture file"
     elif not queue.overwrites:
         yield f"{queue.name} refuses values when it is full: set overwrite to true"
-    if len(queue.readers) > 1:
+    if is_read and len(queue.readers) > 1:
         names = ", ".join(queue.readers)
         yield f"{queue.name} has several readers ({names}): each takes values of the others"
 

@@ -1,7 +1,8 @@
 """`mauve analyze --chain FROM:TO`: the bounds of a chain, and what a bag shows of it."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,8 @@ from mauve_rt.analysis.study import Study
 from mauve_rt.analysis.verdict import Outcome
 from mauve_rt.cli.chain_routes import Wiring
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.reading.chains import ChainTimes, chain_times
+from mauve_rt.trace.reading.chains import ChainTimes, Jobs, chain_times, jobs_of
 from mauve_rt.trace.reading.statistics import Distribution
-from mauve_rt.trace.reading.trace import Trace
 
 _FIGURES = {"reaction": "reaction", "data_age": "data age"}
 """Fields of ChainTimes, and how they are written."""
@@ -27,6 +27,8 @@ class JudgedRoute:
     measured: ChainTimes | None
     waits_in_queues: bool
     """Whether the measured times lack the time in a queue."""
+    not_measured: str = ""
+    """Why a bag does not show it."""
 
     @property
     def contradictions(self) -> list[str]:
@@ -84,28 +86,26 @@ def judged_chains(
     import mauve_rt.trace  # noqa: PLC0415 - only with a bag
 
     trace = None if bag is None else mauve_rt.trace.open(bag)
+    jobs = None if trace is None else cache(lambda component: jobs_of(trace.of(component)))
     chains = []
     for word in words:
         routes = wiring.routes(word)
-        judged = [
-            JudgedRoute(
-                route_bound(route, wiring.channels, now, wakeup_ns=wakeup_ns),
-                _measured(trace, route.members),
-                any(name in wiring.channels and wiring.channels[name].is_queue for name in route.channels),
-            )
-            for route in routes
-        ]
+        bounds = [route_bound(route, wiring.channels, now, wakeup_ns=wakeup_ns) for route in routes]
+        judged = [_judged(bound, wiring, jobs) for bound in bounds]
         judged.sort(key=lambda one: -(one.bound.longest_ns or 0))
         chains.append(JudgedChain(word, tuple(judged), tuple(assumptions_of(routes, wiring.channels))))
     return chains
 
 
-def _measured(trace: Trace | None, members: Sequence[str]) -> ChainTimes | None:
-    """None: there is no bag, or a component is not in it."""
+def _judged(bound: RouteBound, wiring: Wiring, jobs: Callable[[str], Jobs] | None) -> JudgedRoute:
+    """A route, measured where there is a bag with the jobs of its members."""
+    known = (wiring.channels[name] for name in bound.route.channels[:-1] if name)
+    waits_in_queues = any(channel.is_queue for channel in known)
     try:
-        return None if trace is None else chain_times(trace, members)
-    except TraceError:
-        return None
+        measured = None if jobs is None else chain_times([jobs(name) for name in bound.route.members])
+    except TraceError as error:
+        return JudgedRoute(bound, None, waits_in_queues, str(error))
+    return JudgedRoute(bound, measured, waits_in_queues)
 
 
 def print_chain(chain: JudgedChain) -> None:
@@ -125,6 +125,8 @@ def _lines(chain: JudgedChain) -> Iterator[str]:
             yield f"  {one.bound.route}: {_bound(one.bound)}"
         elif len(chain.routes) > 1 or chain.longest_ns is None:
             yield f"  route {one.bound.route}"
+        if one.not_measured:
+            yield f"    not measured: {one.not_measured}"
         if one.measured is not None:
             measured = "at least, without the time in a queue, " if one.waits_in_queues else ""
             for name, words in _FIGURES.items():
@@ -169,5 +171,6 @@ def _route_json(one: JudgedRoute) -> dict[str, Any]:
         "terms": [asdict(term) for term in one.bound.terms],
         "reasons": one.bound.reasons,
         "measured": None if one.measured is None else asdict(one.measured),
+        "not_measured": one.not_measured,
         "measured_without_queues": one.waits_in_queues,
     }

@@ -15,7 +15,6 @@ import numpy.typing as npt
 from mauve_rt.trace.format.records import Kind, Records
 from mauve_rt.trace.reading.pairs import following, gaps
 from mauve_rt.trace.reading.statistics import Distribution, Values, distribution
-from mauve_rt.trace.reading.trace import Trace
 
 _ALWAYS = np.iinfo(np.int64)
 _BREAKS = (Kind.START, Kind.STOP, Kind.FAULT, Kind.PARKED)
@@ -61,14 +60,8 @@ def jobs_of(records: Records) -> Jobs:
     return Jobs(begins_ns, ends_ns, np.unique(np.array(unknown, np.int64), axis=0))
 
 
-def chain_times(trace: Trace, components: Sequence[str]) -> ChainTimes:
-    """The times of a chain of components; what spans a gap, a stop, a fault or a change is left out.
-
-    Raises:
-        TraceError: there is no such component in the trace.
-
-    """
-    jobs = [jobs_of(trace.of(component)) for component in components]
+def chain_times(jobs: Sequence[Jobs]) -> ChainTimes:
+    """The times of a chain of components; what spans a gap, a stop, a fault or a change is left out."""
     return ChainTimes(distribution(reactions_ns(jobs)), distribution(data_ages_ns(jobs)))
 
 

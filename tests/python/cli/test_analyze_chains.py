@@ -188,6 +188,24 @@ def test_a_bag_shows_the_distribution(analyze: Analyze, tmp_path: Path) -> None:
     assert "    measured data age: min 34.000 ms, " in out
 
 
+def test_a_bag_without_a_member_is_said(analyze: Analyze, tmp_path: Path) -> None:
+    source = SyntheticSource(["quick"])
+    deploy(source, "quick")
+    bag = record(source, tmp_path / "bag")
+    status, out, _ = analyze(CHAIN, "--chain", "given:result", "--budget-from", str(bag))
+    assert status == 0
+    assert "    not measured: component 'slow': not in the trace, which has quick\n" in out
+
+
+def test_a_queue_is_not_in_the_measured_times(analyze: Analyze, tmp_path: Path) -> None:
+    kind = "between: {kind: latest_value, type: std_msgs/msg/Float64"
+    queue = kind.replace("latest_value", "ring_buffer, capacity: 4, overwrite: true, longest_hold_ns: 1000")
+    text = CHAIN.replace("cpus: [1]", "cpus: [0]").replace(kind, queue)
+    bag = recorded(tmp_path / "bag")
+    _, out, _ = analyze(text, "--chain", "given:result", "--budget-from", str(bag))
+    assert "    measured reaction: at least, without the time in a queue, min 24.000 ms, " in out
+
+
 def test_a_chain_that_lasts_longer_than_its_bound_refutes_the_model(analyze: Analyze, tmp_path: Path) -> None:
     bag = recorded(tmp_path / "bag", slow_late_ns=20 * MS)
     status, out, _ = analyze(CHAIN, "--chain", "given:result", "--budget-from", str(bag))

@@ -45,7 +45,8 @@ def test_reactions_and_ages_by_hand() -> None:
 
 
 def test_the_distribution_is_of_all_of_them() -> None:
-    found = chain_times(two(), ["a", "b"])
+    trace = two()
+    found = chain_times([jobs_of(trace.of(name)) for name in trace.components])
     assert isinstance(found, ChainTimes)
     assert found.reaction.count
     assert found.reaction.max_ns == 36 * MS
