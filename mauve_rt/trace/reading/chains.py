@@ -47,10 +47,7 @@ def jobs_of(records: Records) -> Jobs:
     releases, waits = following(records, Kind.RELEASE, then, unless)
     begins_ns = np.asarray(records["b"][releases], np.int64)
     ends_ns = np.asarray(records["time_ns"][waits], np.int64)
-    broken = gaps(records) | np.isin(records["kind"], _BREAKS)
-    (all_releases,) = np.nonzero(records["kind"] == Kind.RELEASE)
-    broken[np.setdiff1d(all_releases, releases)] = True
-    (breaks,) = np.nonzero(broken)
+    (breaks,) = np.nonzero(gaps(records) | np.isin(records["kind"], _BREAKS))
     before = np.concatenate([[_ALWAYS.min], ends_ns])
     after = np.concatenate([begins_ns, [_ALWAYS.max]])
     unknown = [(_ALWAYS.min, after[0]), (before[-1], _ALWAYS.max)]

@@ -132,6 +132,11 @@ def test_a_channel_that_may_lose_a_value_is_named(channel: Channel, why: str) ->
     assert (found.longest_ns, found.reasons) == (None, (why,))
 
 
+def test_nothing_has_to_be_known_of_the_readers_of_the_last_resource() -> None:
+    last = Channel("c1", "pkg/Map", writers=("a", "x"), readers=("y",))
+    assert bound_of(loop("a", 1, 10), channels=[last]).longest_ns == 11 * MS
+
+
 def test_a_queue_at_the_end_may_refuse_the_output() -> None:
     full = Channel("c1", "ring_buffer", 4, readers=("x", "y"))
     assert bound_of(loop("a", 1, 10), channels=[full]).reasons == (
@@ -151,6 +156,13 @@ def test_a_member_without_a_bound_is_named() -> None:
     assert skips.reasons == (
         "b may miss a release: a job has a response of 9.000 ms and 8.000 ms to the next one",
     )
+    cut = machine(
+        execution("Run", "Pause", wcet_ms=2, bound_ms=3, initial=True),
+        wait("Pause", "Run", ms=20),
+        name="cut",
+    )
+    (why,) = bound_of(cut, loop("a", 2, 20, 60)).reasons
+    assert why.startswith("cut may be faulted: Run may last 4.000 ms, ")
     catches_up = replace(loop("b", 4, 8, 50, deadline_ns=40 * MS), overrun="catch_up")
     assert bound_of(catches_up, loop("a", 5, 20, 60)).longest_ns == (8 + 9 + 20 + 5) * MS
 

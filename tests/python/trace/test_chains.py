@@ -73,3 +73,13 @@ def test_what_spans_a_break_is_left_out() -> None:
 
     for between in (stop, lose, restart):
         assert values(two(between=between)) == ([], []), "what begins at 10 or 20 ends behind the break"
+
+
+def test_nothing_is_known_before_a_recording_begins() -> None:
+    source = SyntheticSource(["a", "b"])
+    for name, begin, period, count in (("a", 0, 10, 6), ("b", 15, 20, 2)):
+        instant = EPOCH_NS + begin * MS
+        for _ in range(count):
+            instant = source.cycle(name, instant, states={"run": MS}, wait_ns=period * MS)
+    reactions, _ = values(trace_of(source))
+    assert reactions == [36 - 20], "changes at 0 and 10 are not counted: b may have run at 13"
