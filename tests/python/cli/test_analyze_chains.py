@@ -3,10 +3,12 @@
 import json
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from synthetic_traces import EPOCH_NS, MS, deploy, record
 
+from mauve_rt.cli.chain_routes import Wiring
 from mauve_rt.cli.main import main
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -105,6 +107,32 @@ def test_the_longest_of_several_routes_counts(analyze: Analyze) -> None:
     assert "\ngiven:result: not provable: no bound of reaction and data age\n  " in out
     assert "\n  third has no response bound: it is not provable\n" in out
     assert "\ngiven:between: reaction at most 13.000 ms" in out, "neither is in it"
+
+
+def ports(**resources: str) -> list[SimpleNamespace]:
+    """Of names as `read_scan`: its kind is in front."""
+    return [
+        SimpleNamespace(name=name, kind=name.partition("_")[0], service="", resource=resource)
+        for name, resource in resources.items()
+    ]
+
+
+@pytest.mark.parametrize(
+    ("chain", "routes"),
+    [
+        ("a:b", ["a -> x -> b", "a -> y -> b"]),
+        ("a.write_y:b", ["a -> y -> b"]),
+        ("a:b.read_x", ["a -> x -> b"]),
+        ("a.read_in:b.write_out", ["in -> a -> x -> b -> out", "in -> a -> y -> b -> out"]),
+        ("a:b.read_x:out", ["a -> x -> b -> out"]),
+        ("in:a:x:b", ["in -> a -> x -> b"]),
+        ("in:out", ["in -> a -> x -> b -> out", "in -> a -> y -> b -> out"]),
+    ],
+)
+def test_a_port_chooses_the_way(chain: str, routes: list[str]) -> None:
+    first = SimpleNamespace(name="a", ports=ports(read_in="in", write_x="x", write_y="y", read_back="out"))
+    last = SimpleNamespace(name="b", ports=ports(read_x="x", read_y="y", write_out="out"))
+    assert [str(route) for route in Wiring.of([first, last]).routes(chain)] == routes
 
 
 FORM = "--chain: expected FROM:TO as scan:command, or each step of one route as scan:control:command"
