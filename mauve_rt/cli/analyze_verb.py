@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Bound, Subject
     from mauve_rt.analysis.machines import Machine
     from mauve_rt.analysis.study import Study, Surroundings
+    from mauve_rt.cli.analyze_chains import JudgedChain
     from mauve_rt.cli.analyze_plan import Plan
     from mauve_rt.cli.analyzed import Analyzed
 
@@ -106,6 +107,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="judge each alternative and fallback core of an architecture FILE, too",
     )
+    parser.add_argument(
+        "--chain",
+        action="append",
+        default=[],
+        metavar="FROM:TO",
+        help="bound the reaction time and the data age from a component, port (COMPONENT.PORT), resource or "
+        "topic to another one by each route, or by one route (FROM:STEP:...:TO), and measure both in a bag; "
+        "may be repeated",
+    )
     parser.add_argument("--json", action="store_true", help="print the result as JSON")
 
 
@@ -115,7 +125,6 @@ def main(args: argparse.Namespace) -> int:
     from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415 - only this verb
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.study import study  # noqa: PLC0415
-    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
     from mauve_rt.cli.analyzed import analyzed  # noqa: PLC0415
     from mauve_rt.cli.measured_times import budgets_of, measured_of, statistics_of  # noqa: PLC0415
     from mauve_rt.cli.supposed import with_supposed  # noqa: PLC0415
@@ -143,32 +152,72 @@ def main(args: argparse.Namespace) -> int:
     ]
     if any(bound.by == OFFSETS for bound in now.bounds.values()):
         assumptions.append("components keep their offsets from the common epoch")
-    plans: list[Plan] = []
-    if args.plan is not None or args.alternatives:
-        planner = Planner(found, now, components, surroundings)
-        plans += planner.of_file(args.plan) if args.plan is not None else ()
-        plans += planner.alternatives() if args.alternatives else ()
+    plans = _plans(args, found, now, components, surroundings)
+    chains = _chains(args, found, now, surroundings, bag)
     if args.json:
         told = _as_json(now, surroundings, assumptions)
-        if args.plan is not None or args.alternatives:
-            told["changes"] = [_plan_json(plan) for plan in plans]
-        print(json.dumps(told, indent=2))
+        print(json.dumps({**told, **_asked_json(args, plans, chains)}, indent=2))
     else:
-        from mauve_rt.cli.analyze_view import (  # noqa: PLC0415
-            print_model,
-            print_plan,
-            print_verdict,
-        )
-
-        print_model(now, surroundings.threads)
-        print_verdict(now, assumptions)
-        for plan in plans:
-            print_plan(plan)
+        _print(now, surroundings, assumptions, plans, chains)
     studies = [now, *(each for plan in plans for each in (plan.during, plan.after))]
     if args.witness is not None:
         _write_witness(args.witness, studies)
-    outcomes = {each.verdict.outcome.name for each in studies}
+    outcomes = {each.verdict.outcome.name for each in studies} | {each.outcome.name for each in chains}
     return next(status for name, status in _STATUSES.items() if name in outcomes)
+
+
+def _plans(
+    args: argparse.Namespace,
+    found: "Analyzed",
+    now: "Study",
+    components: "Sequence[Machine]",
+    surroundings: "Surroundings",
+) -> "list[Plan]":
+    """Of --plan and --alternatives."""
+    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
+
+    if args.plan is None and not args.alternatives:
+        return []
+    planner = Planner(found, now, components, surroundings)
+    plans = [*planner.of_file(args.plan)] if args.plan is not None else []
+    return [*plans, *planner.alternatives()] if args.alternatives else plans
+
+
+def _chains(
+    args: argparse.Namespace,
+    found: "Analyzed",
+    now: "Study",
+    surroundings: "Surroundings",
+    bag: Path | None,
+) -> "list[JudgedChain]":
+    """Of --chain."""
+    from mauve_rt.cli.analyze_chains import judged_chains  # noqa: PLC0415
+    from mauve_rt.cli.chain_routes import Wiring  # noqa: PLC0415
+
+    if not args.chain:
+        return []
+    wiring = Wiring.of(found.described, found.channels)
+    return judged_chains(args.chain, wiring, now, wakeup_ns=surroundings.wakeup_ns, bag=bag)
+
+
+def _print(
+    now: "Study",
+    surroundings: "Surroundings",
+    assumptions: Sequence[str],
+    plans: "Sequence[Plan]",
+    chains: "Sequence[JudgedChain]",
+) -> None:
+    from mauve_rt.cli.analyze_view import print_model, print_plan, print_verdict  # noqa: PLC0415
+
+    print_model(now, surroundings.threads)
+    print_verdict(now, assumptions)
+    for plan in plans:
+        print_plan(plan)
+    if chains:
+        from mauve_rt.cli.analyze_chains import print_chain  # noqa: PLC0415
+
+        for chain in chains:
+            print_chain(chain)
 
 
 _STATUSES = {
@@ -283,6 +332,18 @@ def _as_json(now: "Study", surroundings: "Surroundings", assumptions: Sequence[s
         "verdict": judged,
         "assumptions": assumptions,
     }
+
+
+def _asked_json(
+    args: argparse.Namespace, plans: "Sequence[Plan]", chains: "Sequence[JudgedChain]"
+) -> dict[str, Any]:
+    """Answers to --chain, --plan and --alternatives."""
+    from mauve_rt.cli.analyze_chains import chain_json  # noqa: PLC0415
+
+    found: dict[str, Any] = {"chains": [chain_json(chain) for chain in chains]} if args.chain else {}
+    if args.plan is not None or args.alternatives:
+        found["changes"] = [_plan_json(plan) for plan in plans]
+    return found
 
 
 def _plan_json(plan: "Plan") -> dict[str, Any]:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mauve_rt.analysis.chains import Channel
 from mauve_rt.analysis.machines import ExecutionTime, Machine
 from mauve_rt.analysis.threads import machines_of
 from mauve_rt.cli.bag_arguments import is_bag
@@ -13,6 +14,7 @@ from mauve_rt.model.threads import ThreadList
 if TYPE_CHECKING:
     from mauve_rt._kernel import PluginRegistry
     from mauve_rt.model import ArchitectureModel
+    from mauve_rt.model.schema import ResourceModel
     from mauve_rt.modelling.package_model import PackageModel
     from mauve_rt.trace.reading.trace import Trace
 
@@ -28,6 +30,10 @@ class Analyzed:
     """Of a file."""
     registry: "PluginRegistry | None" = None
     """With the parts of a file."""
+    described: Sequence[Any] = ()
+    """The components with their ports, as mauve_msgs/msg/ComponentInfo or with its fields."""
+    channels: Sequence[Channel] = ()
+    """What is known of the resources."""
 
 
 def analyzed(target: str, models: Sequence[Path]) -> Analyzed:
@@ -98,7 +104,22 @@ def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:
     threads = thread_list(
         model.executor, uses_of(model), components=len(model.components), has_bounds=has_bounds
     )
-    return Analyzed(machines, threads, model, parts.registry)
+    channels = [_channel(name, one, model.namespace) for name, one in model.resources.items()]
+    return Analyzed(machines, threads, model, parts.registry, architecture.components(), channels)
+
+
+def _channel(name: str, one: "ResourceModel", namespace: str) -> Channel:
+    from mauve_rt.supervision.rule_names import full_name  # noqa: PLC0415
+
+    topic = () if one.topic is None else (full_name(one.topic.name, namespace),)
+    return Channel(
+        name,
+        one.kind,
+        capacity=int(one.parameters.get("capacity", 0)),
+        overwrites=bool(one.parameters.get("overwrite", False)),
+        writers=topic if one.topic is not None and one.topic.direction == "subscribe" else (),
+        topics=topic,
+    )
 
 
 def _wait_free(part: Any, kinds: Mapping[str, str]) -> set[str]:
@@ -110,12 +131,24 @@ def _wait_free(part: Any, kinds: Mapping[str, str]) -> set[str]:
 def _of_node(node: str) -> Analyzed:
     from mauve_msgs.srv import ListComponents, ListTasks  # noqa: PLC0415
     from mauve_rt.cli.client import connected  # noqa: PLC0415
+    from mauve_rt.trace.reading.architecture import ComponentInfo  # noqa: PLC0415
 
     with connected(first=True) as client:
         reply = client.call(ListComponents, f"{node}/list_components", ListComponents.Request())
         threads = client.call(ListTasks, f"{node}/list_tasks", ListTasks.Request()).list
     kinds = {resource.name: resource.kind for resource in reply.resources}
-    return Analyzed(_of_told(reply.components, kinds), _threads_of(threads))
+    channels = [
+        Channel(
+            one.name,
+            one.kind,
+            writers=(one.subscribes,) if one.subscribes else (),
+            topics=tuple(filter(None, (one.publishes, one.subscribes))),
+        )
+        for one in reply.resources
+    ]
+    described = [*map(ComponentInfo.of_message, reply.components)]
+    machines = _of_told(reply.components, kinds)
+    return Analyzed(machines, _threads_of(threads), described=described, channels=channels)
 
 
 def _threads_of(told: Any) -> ThreadList:
@@ -136,7 +169,7 @@ def _of_bag(path: Path) -> Analyzed:
 def of_trace(trace: "Trace") -> Analyzed:
     """What a bag tells."""
     threads = None if trace.threads is None else _threads_of(trace.threads)
-    return Analyzed(_of_told(trace.architecture, {}), threads)
+    return Analyzed(_of_told(trace.architecture, {}), threads, described=trace.architecture)
 
 
 def _of_told(components: Iterable[Any], kinds: Mapping[str, str]) -> list[Machine]:

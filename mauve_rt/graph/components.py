@@ -57,6 +57,11 @@ def resource_key(name: str) -> str:
     return f"resource {name}"
 
 
+def takes_values(port: Any) -> bool:
+    """Whether a component takes values from the resource of a port, rather than gives some to it."""
+    return port.kind in ("read", "event") or port.service.startswith(("read", "get"))
+
+
 def cpus_text(cpus: Iterable[int] | None) -> str:
     """`CPU 0, 2`, or `any CPU`: the frame in which components of the same CPUs stand; empty: not known."""
     if cpus is None:
@@ -120,9 +125,8 @@ def _resource(name: str, described: Any, components: Iterable[Any]) -> Node:
 
 def _edge(component: Any, port: Any) -> Edge:
     """Along the data: a component takes values from a resource, or gives some to it."""
-    takes = port.kind in ("read", "event") or port.service.startswith(("read", "get"))
     ends = [component_key(component.name), resource_key(port.resource)]
-    start, end = reversed(ends) if takes else ends
+    start, end = reversed(ends) if takes_values(port) else ends
     tip = f"{component.name}.{port.name} ({port.kind}), {port.resource}.{port.service}"
     return Edge(
         start=start,

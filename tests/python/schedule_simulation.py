@@ -51,6 +51,16 @@ class Thread:
     wants_since: int = 0
     priority: int = 0
     in_job: bool = False
+    began_ns: int = -1
+
+
+def simulated_jobs(
+    tasks: Sequence[Scheduled], releases: dict[str, list[Release]]
+) -> dict[str, list[tuple[int, int]]]:
+    """Of each task the first instant at which each job executes, and its finish."""
+    cpu = _Cpu(tasks, releases)
+    cpu.run()
+    return cpu.finished
 
 
 def simulate(tasks: Sequence[Scheduled], releases: dict[str, list[Release]]) -> dict[str, int]:
@@ -66,6 +76,7 @@ class _Cpu:
         self.owners: dict[str, Thread] = {}
         self.heirs: dict[str, Thread] = {}  # woken for a lock: one more urgent may take it first
         self.longest = dict.fromkeys(releases, 0)
+        self.finished: dict[str, list[tuple[int, int]]] = {name: [] for name in releases}
         self.order = count()
         self.events: list[tuple[int, int, Thread]] = []
         for thread in self.threads:
@@ -95,6 +106,7 @@ class _Cpu:
             return
         kind, value = thread.steps[0]
         if kind == RUN:
+            thread.began_ns = self.now if thread.began_ns < 0 else thread.began_ns
             end = self.now + int(value)
             until = min(end, self.events[0][0]) if self.events else end
             thread.steps[0] = (RUN, end - until)
@@ -117,6 +129,8 @@ class _Cpu:
         done = thread.jobs.popleft()
         name = thread.task.name
         self.longest[name] = max(self.longest[name], self.now - done.arrival_ns)
+        self.finished[name].append((thread.began_ns, self.now))
+        thread.began_ns = -1
         if thread.jobs and thread.jobs[0].release_ns <= self.now:
             self._begin(thread)
         else:

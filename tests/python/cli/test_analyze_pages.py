@@ -1,6 +1,5 @@
 """What the pages about the timing proof show is what `mauve analyze` prints."""
 
-import re
 import shlex
 from pathlib import Path
 
@@ -22,11 +21,11 @@ def test_the_commands_of_the_how_to_print_what_it_shows(
     monkeypatch.chdir(tmp_path)
     texts = [block.text for block in BLOCKS if block.is_fenced and not block.language]
     commands = [shlex.split(text)[1:] for text in texts if text.startswith("mauve ")]
-    assert [words[0] for words in commands] == ["analyze", "analyze", "analyze", "report"]
+    assert [words[0] for words in commands] == ["analyze"] * 3 + ["report", "analyze"]
     shown = [text for text in texts if not text.startswith("mauve ")]
-    for words, status, lines in zip(commands[1:3], (0, 1), shown, strict=True):
+    for words, status, lines in zip((*commands[1:3], commands[4]), (0, 1, 0), shown, strict=True):
         assert main(words) == status
-        assert lines.rstrip("\n") in re.sub(r"(?<=ms:) ", "\n", capsys.readouterr().out)
+        assert " ".join(lines.split()) in " ".join(capsys.readouterr().out.split())
     assert main(commands[3]) == 0
     assert (tmp_path / "slow/report.html").stat().st_size > 0
 

@@ -91,6 +91,8 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "--suppose guidance.Planning=120ms --witness slow": (HOWTO_ANALYZE,),
         "not schedulable: mapping": (HOWTO_ANALYZE,),
         "mauve report slow": (HOWTO_ANALYZE,),
+        "--chain scan:control:command": (HOWTO_ANALYZE,),
+        "scan:control:command: reaction at most": (HOWTO_ANALYZE,),
     },
     "docs/howto/launch_files.md": {
         "def generate_launch_description": (f"{HOWTO}the_launch_file_of_the_page_gives_arguments_there_are",),

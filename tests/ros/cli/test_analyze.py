@@ -47,9 +47,10 @@ def test_a_file_a_node_and_a_bag_tell_one_model(  # noqa: PLR0915 - one executor
     graph.spin_until(lambda: len(counts) > 20, "counts")
 
     threads: dict[str, Any] = {}
+    routes: dict[str, Any] = {}
 
     def analyzed(*words: str) -> dict[str, Any]:
-        command = [sys.executable, "-m", "mauve_rt.cli", "analyze", *words, "--json"]
+        command = [sys.executable, "-m", "mauve_rt.cli", "analyze", *words, "--chain", "set:count", "--json"]
         environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
         done = subprocess.run(
             command, env=environment, capture_output=True, text=True, check=False, timeout=200
@@ -57,6 +58,7 @@ def test_a_file_a_node_and_a_bag_tell_one_model(  # noqa: PLR0915 - one executor
         assert (done.returncode, done.stderr) == (NOT_PROVED, ""), "no component has a CPU of its own"
         told = json.loads(done.stdout)
         threads[words[0]] = told["threads"]
+        (routes[words[0]],) = told["chains"][0]["routes"]
         assert (told["wakeup_ns"], told["overhead_ns"]) == (70_000, 9_000)
         return {component["name"]: component for component in told["components"]}
 
@@ -64,6 +66,11 @@ def test_a_file_a_node_and_a_bag_tell_one_model(  # noqa: PLR0915 - one executor
     assert executor.end(signal.SIGTERM)[0] == 0
     of_file, of_bag = analyzed(str(architecture)), analyzed(str(bag))
     assert threads[NODE] == threads[str(bag)] == threads[str(architecture)]
+    assert {one["route"] for one in routes.values()} == {"set -> counter -> count"}
+    assert "set has several readers (counter, guard): each takes" in " ".join(
+        routes[str(architecture)]["reasons"]
+    )
+    assert routes[str(bag)]["measured"]["reaction"]["count"] > 0
     assert [*of_file] == [*of_node] == [*of_bag] == ["counter", "guard", "sleepy"]
     for name, told in of_file.items():
         for other in (of_node[name], of_bag[name]):
