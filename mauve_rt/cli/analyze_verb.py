@@ -122,7 +122,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def main(args: argparse.Namespace) -> int:
     """Print the model and the verdict; returns the exit status."""
     from mauve_rt.analysis.bounds import OFFSETS  # noqa: PLC0415 - only this verb
-    from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415 - only this verb
+    from mauve_rt.analysis.locks import with_measured_holds  # noqa: PLC0415
     from mauve_rt.analysis.obstacles import assumptions_about  # noqa: PLC0415
     from mauve_rt.analysis.study import study  # noqa: PLC0415
     from mauve_rt.cli.analyzed import analyzed  # noqa: PLC0415
@@ -174,10 +174,10 @@ def _plans(
     surroundings: "Surroundings",
 ) -> "list[Plan]":
     """Of --plan and --alternatives."""
-    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
-
     if args.plan is None and not args.alternatives:
         return []
+    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
+
     planner = Planner(found, now, components, surroundings)
     plans = [*planner.of_file(args.plan)] if args.plan is not None else []
     return [*plans, *planner.alternatives()] if args.alternatives else plans
@@ -191,11 +191,11 @@ def _chains(
     bag: Path | None,
 ) -> "list[JudgedChain]":
     """Of --chain."""
+    if not args.chain:
+        return []
     from mauve_rt.cli.analyze_chains import judged_chains  # noqa: PLC0415
     from mauve_rt.cli.chain_routes import Wiring  # noqa: PLC0415
 
-    if not args.chain:
-        return []
     wiring = Wiring.of(found.described, found.channels)
     return judged_chains(args.chain, wiring, now, wakeup_ns=surroundings.wakeup_ns, bag=bag)
 

@@ -5,7 +5,8 @@
     mauve reconfigure /robot_1/executor steps.yaml --dry-run
 
 Exit status: 0 done, 1 refused by the executor (code and message on stderr), 2 bad usage, bad file or no such
-executor, 3 `analyze` proves neither the one nor the other, 141 nobody reads the output any more.
+executor, 3 `analyze` proves neither the one nor the other, 4 its verdict is a forecast, 5 a recording
+refutes it, 141 the reader of the output is gone.
 """
 
 import argparse
