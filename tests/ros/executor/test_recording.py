@@ -25,7 +25,7 @@ from mauve_rt.trace.recording.trace_bag import LEDGER
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
-ROOM = 30_000  # bytes: some records
+ROOM = 60_000  # bytes: the definitions of messages take a half, then come records
 MORE = 4_000  # bytes: room for some more of them
 
 
