@@ -147,10 +147,10 @@ def by_cpu(subjects: Sequence[Subject]) -> list[list[Subject]]:
     """Those without obstacles: components of each CPU, and threads that may run there."""
     known = [subject for subject in subjects if not subject.obstacles]
     cpus = sorted({subject.machine.cpus for subject in known if subject.machine.is_component})
-    return [[subject for subject in known if runs_on(subject.machine, each)] for each in cpus]
+    return [[subject for subject in known if _runs_on(subject.machine, each)] for each in cpus]
 
 
-def runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
+def _runs_on(machine: Machine, cpus: tuple[int, ...]) -> bool:
     """Whether a component runs on these CPUs, or another thread may."""
     if machine.is_component:
         return machine.cpus == cpus

@@ -17,12 +17,20 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import takewhile
 
-from mauve_rt.analysis.blocking import blocking_ns, shares_a_resource
+from mauve_rt.analysis.blocking import blocking_ns
 from mauve_rt.analysis.critical_section import CriticalSection
-from mauve_rt.analysis.demand import Demand, Path, cost_of, paths, utilization_of
+from mauve_rt.analysis.demand import Demand, Path, paths, utilization_of
 from mauve_rt.analysis.digraph import DigraphTask, Job
-from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime
-from mauve_rt.analysis.fixed_point import MOST_STEPS, UnboundedError, least_time_ns
+from mauve_rt.analysis.digraph_times import (
+    Component,
+    Delay,
+    DigraphTimes,
+    JobTime,
+    level_of,
+    overload,
+    window_ns,
+)
+from mauve_rt.analysis.fixed_point import MOST_STEPS, UnboundedError
 from mauve_rt.analysis.machines import FOREVER_NS
 
 _NOTHING = DigraphTask("", ())
@@ -92,23 +100,18 @@ def _times(
     loads: Mapping[str, tuple[Fraction, Fraction]],
     jitter_ns: int,
 ) -> DigraphTimes:
-    own = merged[name]
-    others = [each for each in merged if each != name]
-    higher = [each for each in others if merged[each].priority > own.priority]
-    equal = [each for each in others if merged[each].priority == own.priority]
-    if own.waits_for_services or shares_a_resource(own, merged.values()):
-        higher, equal = [*higher, *equal], []
-    blocked_ns = blocking_ns(own, [*merged.values()])
+    own, components = merged[name], [*merged.values()]
+    higher, equal = ([each.name for each in rank] for rank in level_of(own, components))
+    blocked_ns = blocking_ns(own, components)
     for each in zip(*(loads[one] for one in (name, *higher, *equal)), strict=True):
         load = sum(each, start=Fraction(0))
-        if load > 1 or (load == 1 and (blocked_ns or jitter_ns)):
-            reason = f"the utilization at this priority is {float(load):.4g}: nothing is left"
+        if reason := overload(load, has_more=blocked_ns > 0 or jitter_ns > 0):
             return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
-    ranks = ([mixes[each] for each in higher], [mixes[each] for each in equal])
+    delay = Delay([mixes[each] for each in higher], [mixes[each] for each in equal], blocked_ns)
     try:
-        return _worst(mixes[name], ranks, blocked_ns, jitter_ns)
-    except UnboundedError as reason:
-        return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
+        return _worst([mixes[each] for each in (name, *higher, *equal)], delay, jitter_ns)
+    except UnboundedError as error:
+        return DigraphTimes(reason=str(error), blocking_ns=blocked_ns)
 
 
 def _loads(member: Member) -> tuple[Fraction, Fraction]:
@@ -124,33 +127,28 @@ def _task(member: Member, *, is_new: bool) -> DigraphTask:
     return _NOTHING if part is None else part.task
 
 
-_Ranks = tuple[list["_Mix"], list["_Mix"]]
-"""Those of higher priority, and those of equal priority."""
+def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int) -> DigraphTimes:
+    """The longest of each job of the first one, over all instants of the change."""
+    own = mixes[0]
 
+    def window_at_ns(change_ns: int) -> int:
+        for mix in mixes:
+            mix.change_at(change_ns)
+        return window_ns(mixes, delay.blocking_ns)
 
-def _worst(own: "_Mix", ranks: _Ranks, blocking: int, jitter_ns: int) -> DigraphTimes:
-    """The longest of each job, over all instants of the change."""
-    mixes = [own, *ranks[0], *ranks[1]]
-    before_ns = _level_at(FOREVER_NS, own, ranks, blocking).window_ns
+    before_ns = window_at_ns(FOREVER_NS)
     longest: dict[Job, int] = {}
     walls: dict[str, int] = {}
     for change_ns in _instants([mix for mix in mixes if mix.is_changed]):
-        level = _level_at(change_ns, own, ranks, blocking)
-        for path in own.jobs_until(level.window_ns + jitter_ns):
-            response_ns = level.finish_ns(path) - (path.release_ns - jitter_ns)
+        for path in own.jobs_until(window_at_ns(change_ns) + jitter_ns):
+            response_ns = delay.finish_ns(path) - (path.release_ns - jitter_ns)
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
         for name, cost_ns in own.states:
-            walls[name] = max(level.wall_ns(cost_ns), walls.get(name, 0))
+            walls[name] = max(delay.wall_ns(cost_ns), walls.get(name, 0))
         if change_ns > before_ns + jitter_ns:  # after the window
             break
     jobs = tuple(JobTime(job, response_ns) for job, response_ns in longest.items())
-    return DigraphTimes(jobs, blocking_ns=blocking, walls_ns=walls)
-
-
-def _level_at(change_ns: int, own: "_Mix", ranks: _Ranks, blocking: int) -> "_Level":
-    for mix in (own, *ranks[0], *ranks[1]):
-        mix.change_at(change_ns)
-    return _Level(own, *ranks, blocking)
+    return DigraphTimes(jobs, blocking_ns=delay.blocking_ns, walls_ns=walls)
 
 
 def _instants(mixes: "Sequence[_Mix]") -> Iterator[int]:
@@ -190,9 +188,12 @@ class _Mix:
     def change_at(self, change_ns: int) -> None:
         """From now on the answers are for this instant."""
         self.change_ns = change_ns
-        self._switches = (
-            [*_pareto(self._all_switches())] if self.is_changed and change_ns < FOREVER_NS else []
-        )
+        if not self.is_changed or change_ns == FOREVER_NS:
+            self._switches = []
+            return
+        if change_ns not in self._switches_at:
+            self._switches_at[change_ns] = [*_pareto(self._all_switches())]
+        self._switches = self._switches_at[change_ns]
 
     def old_release_from(self, instant_ns: int) -> int:
         """The first release of an old job at or after an instant; FOREVER_NS: none, or nothing changes."""
@@ -225,11 +226,11 @@ class _Mix:
         for path in self._old_before(min(end_ns, self.change_ns)):
             yield path._replace(work_ns=path.work_ns + self._handover_ns)
         for release_ns, before_ns in self._switches:
-            for path in takewhile(lambda one: one.release_ns < end_ns, paths(self._new_task)):
-                at_ns = release_ns + path.release_ns
-                if at_ns >= end_ns:
+            work_ns = before_ns + self._handover_ns
+            for path in paths(self._new_task):
+                if release_ns + path.release_ns >= end_ns:
                     break
-                yield Path(at_ns, before_ns + path.work_ns + self._handover_ns, path.job)
+                yield Path(release_ns + path.release_ns, work_ns + path.work_ns, path.job)
 
     def _all_switches(self) -> Iterator[tuple[int, int]]:
         """The first release with the new parts, and the work of old jobs before it."""
@@ -263,35 +264,3 @@ def _pareto(switches: Iterator[tuple[int, int]]) -> Iterator[tuple[int, int]]:
         if before_ns > most_ns:
             most_ns = before_ns
             yield release_ns, before_ns
-
-
-class _Level:
-    """What can delay the jobs of a component, for one instant of the change."""
-
-    def __init__(self, own: _Mix, higher: Sequence[_Mix], equal: Sequence[_Mix], blocking: int) -> None:
-        self._higher, self._equal, self._blocking_ns = higher, equal, blocking
-        everything = (own, *higher, *equal)
-        self.window_ns = least_time_ns(
-            lambda length_ns: blocking + sum(one.in_ns(length_ns) for one in everything), 1
-        )
-
-    def finish_ns(self, path: Path) -> int:
-        """When the last job of a path is done at the latest, from the window's start on."""
-        equal_ns = 0
-        if self._equal:
-            before_ns = self._blocking_ns + path.work_ns - cost_of(path.job)
-            others = (*self._higher, *self._equal)
-            start_ns = least_time_ns(
-                lambda time_ns: before_ns + sum(one.until_ns(time_ns) for one in others), before_ns
-            )
-            equal_ns = sum(one.until_ns(start_ns) for one in self._equal)
-        return self._least_ns(self._blocking_ns + path.work_ns + equal_ns)
-
-    def wall_ns(self, cost_ns: int) -> int:
-        """How long an execution can last."""
-        return self._least_ns(self._blocking_ns + cost_ns)
-
-    def _least_ns(self, fixed_ns: int) -> int:
-        return least_time_ns(
-            lambda time_ns: fixed_ns + sum(one.in_ns(time_ns) for one in self._higher), fixed_ns
-        )

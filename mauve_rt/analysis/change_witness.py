@@ -11,6 +11,7 @@ from random import Random
 from mauve_rt.analysis.bounds import Subject
 from mauve_rt.analysis.digraph import START, DigraphTask, Job
 from mauve_rt.analysis.machines import FOREVER_NS
+from mauve_rt.analysis.plan import is_same
 from mauve_rt.analysis.schedule import Member, Schedule, run
 from mauve_rt.analysis.witness import Drawn, member_of
 
@@ -66,7 +67,7 @@ def _longest_wait(side: _Side) -> int:
 
 
 def _side(old: Subject | None, new: Subject | None, handover_ns: int | None) -> _Side:
-    if old is not None and new is not None and handover_ns is None and old.machine == new.machine:
+    if old is not None and is_same(old, new, is_handed_over=handover_ns is not None):
         return _Side(member_of(old), (), is_changed=False, is_added=False)
     if new is None:
         if old is None:

@@ -31,6 +31,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from fractions import Fraction
 from itertools import product, takewhile
+from typing import Protocol
 
 from mauve_rt.analysis.blocking import blocking_ns, shares_a_resource
 from mauve_rt.analysis.critical_section import CriticalSection
@@ -129,9 +130,8 @@ def _times(
     level = (one, *higher, *equal)
     load = sum((loads[each.name] for each in level), start=Fraction(0))
     blocked_ns = blocking_ns(one, components)
-    if load > 1 or (load == 1 and (blocked_ns or any(each.jitter_ns for each in level))):
-        more = "" if load > 1 else ", and blocking or late wake-ups come on top"
-        reason = f"the utilization at this priority is {float(load):.4g}{more}: nothing is left"
+    has_more = blocked_ns > 0 or any(each.jitter_ns for each in level)
+    if reason := overload(load, has_more=has_more):
         return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
     try:
         window = _Window(
@@ -146,8 +146,8 @@ def _times(
             response_ns = window.finish_ns(path) - arrival_ns
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
         walls_ns = {name: window.wall_ns(cost_ns) for name, cost_ns in one.states}
-    except UnboundedError as reason:
-        return DigraphTimes(reason=str(reason), blocking_ns=blocked_ns)
+    except UnboundedError as error:
+        return DigraphTimes(reason=str(error), blocking_ns=blocked_ns)
     jobs = tuple(JobTime(job, longest[job]) for job in one.task.jobs)
     return DigraphTimes(jobs, blocking_ns=blocked_ns, walls_ns=walls_ns)
 
@@ -163,6 +163,14 @@ def level_of(
     return higher, equal
 
 
+def overload(load: Fraction, *, has_more: bool) -> str:
+    """Why there is no bound at this load; empty: there may be one. `has_more`: blocking or late wake-ups."""
+    if load < 1 or (load == 1 and not has_more):
+        return ""
+    more = "" if load > 1 else ", and blocking or late wake-ups come on top"
+    return f"the utilization at this priority is {float(load):.4g}{more}: nothing is left"
+
+
 def _within(task: DigraphTask, end_ns: int) -> Iterator[Path]:
     """The paths whose last job is released before the window can end."""
     return takewhile(lambda path: path.release_ns < end_ns, paths(task))
@@ -174,28 +182,18 @@ class _Window:
     def __init__(
         self, own: Demand, higher: Sequence[Demand], equal: Sequence[Demand], *, blocking_ns: int
     ) -> None:
-        everything = (own, *higher, *equal)
-        self.length_ns = least_time_ns(
-            lambda length_ns: blocking_ns + sum(one.in_ns(length_ns) for one in everything), 1
-        )
-        """The least L > 0 with blocking + the demand of all in [0, L) <= L."""
-        self._higher, self._blocking_ns = tuple(higher), blocking_ns
+        self.length_ns = window_ns((own, *higher, *equal), blocking_ns)
+        self._most = Delay(higher, equal, blocking_ns)
         each = _of_each_path((*higher, *equal), self.length_ns)
-        self._delays = [_Delay(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
+        self._delays = [Delay(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
 
     def finish_ns(self, path: Path) -> int:
         """When the last job of a path is done at the latest, from the window's start on."""
         return max(delay.finish_ns(path) for delay in self._delays)
 
     def wall_ns(self, cost_ns: int) -> int:
-        """How long an execution can last: the least w with cost + blocking + the higher demand in w <= w.
-
-        It has begun, so no component of equal priority goes first.
-        """
-        fixed_ns = self._blocking_ns + cost_ns
-        return least_time_ns(
-            lambda time_ns: fixed_ns + sum(one.in_ns(time_ns) for one in self._higher), fixed_ns
-        )
+        """How long an execution can last."""
+        return self._most.wall_ns(cost_ns)
 
 
 def _of_each_path(demands: Sequence[Demand], until_ns: int) -> list[tuple[Staircase, ...]]:
@@ -211,16 +209,31 @@ def _of_each_path(demands: Sequence[Demand], until_ns: int) -> list[tuple[Stairc
     return [*product(*found)]
 
 
-@dataclass(frozen=True)
-class _Delay:
-    """The jobs of other tasks, by one combination of their paths, and those of lower priority that block."""
+class Work(Protocol):
+    """What a task asks for."""
 
-    higher: tuple[Staircase, ...]
-    equal: tuple[Staircase, ...]
+    def in_ns(self, length_ns: int) -> int:
+        """In a half-open interval of this length."""
+
+    def until_ns(self, instant_ns: int) -> int:
+        """In the closed [0, instant]."""
+
+
+def window_ns(everything: Sequence[Work], blocking_ns: int) -> int:
+    """The longest busy window: the least L > 0 with blocking + the demand of all in [0, L) <= L."""
+    return least_time_ns(lambda length_ns: blocking_ns + sum(one.in_ns(length_ns) for one in everything), 1)
+
+
+@dataclass(frozen=True)
+class Delay:
+    """The jobs of other tasks, and those of lower priority that block."""
+
+    higher: Sequence[Work]
+    equal: Sequence[Work]
     blocking_ns: int
 
     def finish_ns(self, path: Path) -> int:
-        """As the window's."""
+        """When the last job of a path is done at the latest, from the window's start on."""
         equal_ns = 0
         if self.equal:
             before_ns = self.blocking_ns + path.work_ns - cost_of(path.job)
@@ -229,7 +242,14 @@ class _Delay:
                 lambda time_ns: before_ns + sum(one.until_ns(time_ns) for one in others), before_ns
             )
             equal_ns = sum(one.until_ns(start_ns) for one in self.equal)
-        fixed_ns = self.blocking_ns + path.work_ns + equal_ns
+        return self.wall_ns(path.work_ns + equal_ns)
+
+    def wall_ns(self, cost_ns: int) -> int:
+        """How long an execution can last: the least w with cost + blocking + the higher demand in w <= w.
+
+        It has begun, so no component of equal priority goes first.
+        """
+        fixed_ns = self.blocking_ns + cost_ns
         return least_time_ns(
-            lambda end_ns: fixed_ns + sum(one.in_ns(end_ns) for one in self.higher), fixed_ns
+            lambda time_ns: fixed_ns + sum(one.in_ns(time_ns) for one in self.higher), fixed_ns
         )

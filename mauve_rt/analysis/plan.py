@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from mauve_rt.analysis.bounds import Bound, Subject, bound_of, component_of, runs_on
+from mauve_rt.analysis.bounds import Bound, Subject, bound_of, by_cpu, component_of
 from mauve_rt.analysis.change import Member, Participant, times_during
 from mauve_rt.analysis.digraph import DigraphTask
 from mauve_rt.analysis.digraph_times import DigraphTimes
@@ -23,18 +23,20 @@ def subjects_during(
 
 
 def bounds_during(
-    before: Sequence[Subject], after: Sequence[Subject], handovers: Handovers, *, wakeup_ns: int = 0
+    subjects: Sequence[Subject],
+    before: Sequence[Subject],
+    after: Sequence[Subject],
+    handovers: Handovers,
+    *,
+    wakeup_ns: int = 0,
 ) -> dict[str, Bound]:
-    """The bound of each component, whenever the change comes.
+    """The bound of each of `subjects_during`, whenever the change comes.
 
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
     """
     olds, news = _by_name(before), _by_name(after)
-    subjects = subjects_during(before, after, handovers)
-    known = [subject for subject in subjects if not subject.obstacles]
     times: dict[str, DigraphTimes] = {}
-    for cpus in sorted({subject.machine.cpus for subject in known if subject.machine.is_component}):
-        here = [subject for subject in known if runs_on(subject.machine, cpus)]
+    for here in by_cpu(subjects):
         members = [
             _member(
                 olds.get(subject.name),
@@ -64,7 +66,7 @@ def _joined(name: str, old: Subject | None, new: Subject | None, handovers: Hand
     if old is None or new is None:
         return one
     obstacles = dict.fromkeys((*old.obstacles, *new.obstacles, *_changing(name, old, new, handovers)))
-    if _is_same(old, new, handovers):
+    if is_same(old, new, is_handed_over=name in handovers):
         return replace(old, obstacles=tuple(obstacles))
     holds = {hold.resource: hold for hold in (*old.machine.holds, *new.machine.holds)}
     machine = replace(
@@ -77,8 +79,11 @@ def _joined(name: str, old: Subject | None, new: Subject | None, handovers: Hand
     return Subject(machine, task, tuple(obstacles))
 
 
-def _is_same(old: Subject, new: Subject, handovers: Handovers) -> bool:
-    return old.machine == new.machine and old.name not in handovers
+def is_same(old: Subject | None, new: Subject | None, *, is_handed_over: bool) -> bool:
+    """Whether nothing of a component changes."""
+    if old is None or new is None or is_handed_over:
+        return False
+    return old.machine == new.machine
 
 
 def _changing(name: str, old: Subject, new: Subject, handovers: Handovers) -> Iterator[str]:
@@ -90,7 +95,7 @@ def _changing(name: str, old: Subject, new: Subject, handovers: Handovers) -> It
 
 
 def _member(old: Subject | None, new: Subject | None, handover_ns: int | None, *, jitter_ns: int) -> Member:
-    if old is not None and new is not None and handover_ns is None and old.machine == new.machine:
+    if old is not None and is_same(old, new, is_handed_over=handover_ns is not None):
         return component_of(old, jitter_ns=jitter_ns)
     parts = [component_of(one, jitter_ns=jitter_ns) if one is not None else None for one in (old, new)]
     return Participant(parts[0], parts[1], handover_ns or 0)

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from mauve_rt.analysis.bounds import Bound, Subject, bounds_of, runs_on
+from mauve_rt.analysis.bounds import Bound, Subject, bounds_of, by_cpu
 from mauve_rt.analysis.change_witness import change_witness
 from mauve_rt.analysis.machines import Machine, in_ms
 from mauve_rt.analysis.obstacles import unknown_costs
@@ -82,7 +82,7 @@ def study_of_change(before: Study, after: Study, handovers: Handovers, surroundi
     """
     subjects = subjects_during(before.subjects, after.subjects, handovers)
     wakeup_ns = surroundings.wakeup_ns
-    bounds = bounds_during(before.subjects, after.subjects, handovers, wakeup_ns=wakeup_ns)
+    bounds = bounds_during(subjects, before.subjects, after.subjects, handovers, wakeup_ns=wakeup_ns)
     verdict = judge(subjects, bounds, unknown=before.unknown, measured=surroundings.measured, searches=False)
     joined = Study(subjects, bounds, verdict, before.unknown)
     if found := _run_during(before, after, joined, handovers, wakeup_ns):
@@ -94,16 +94,16 @@ def _run_during(
     before: Study, after: Study, joined: Study, handovers: Handovers, wakeup_ns: int
 ) -> Verdict | None:
     """Not schedulable, by a run on a CPU where a bound is above its deadline."""
-    known = [subject for subject in joined.subjects if not subject.obstacles]
-    late = [name for name, bound in joined.bounds.items() if not bound.meets_deadline]
-    for cpus in sorted({one.machine.cpus for one in known if one.name in late}):
-        here = {one.name for one in known if runs_on(one.machine, cpus)}
-        old, new = ({one.name: one for one in side.subjects if one.name in here} for side in (before, after))
-        times = {name: ns for name, ns in handovers.items() if name in here and ns is not None}
+    for cpu in by_cpu(joined.subjects):
+        names = {one.name for one in cpu}
+        if all(joined.bounds[name].meets_deadline for name in names & joined.bounds.keys()):
+            continue
+        old, new = ({one.name: one for one in side.subjects if one.name in names} for side in (before, after))
+        times = {name: ns for name, ns in handovers.items() if name in names and ns is not None}
         found = change_witness(old, new, times, wakeup_ns=wakeup_ns)
         if found is not None and found[0].missed is not None:
             schedule, change_ns = found
-            priorities = {one.name: one.machine.priority for one in known}
+            priorities = {one.name: one.machine.priority for one in cpu}
             why = miss_text(schedule, found[0].missed, priorities)
             change = f", with the change at {in_ms(change_ns)}"
             return Verdict(Outcome.NOT_SCHEDULABLE, f"{why}{change}", schedule)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
+from arm_model import arm
 from compiled_plugins import INSTALLED
 
 from mauve_rt._kernel import PluginRegistry
@@ -45,41 +46,7 @@ XML = """\
 """
 
 
-ARM = """\
-mauve_model: 1
-package: my_arm
-types:
-  Reach: {at: my_robot/Point2D, home: geometry_msgs/msg/Point}
-shells:
-  ArmShell:
-    ports: {reach: {read: Reach}, goal: {write: my_robot/Point2D}}
-cores:
-  Arm:
-    shell: ArmShell
-    actions: [move]
-    state: {last: my_robot/Point2D}
-    implementations: {QuickArm: {wcet: {move: 1 ms}}}
-  Follower:
-    shell: my_robot/GuidanceShell
-    actions: [follow]
-    implementations: {Eager: {wcet: {follow: 2 ms}}}
-fsms:
-  ArmFsm:
-    core: Arm
-    initial: Move
-    states: {Move: {run: move, next: Rest}, Rest: {wait: 20 ms, next: Move}}
-  FollowerFsm:
-    core: Follower
-    initial: Follow
-    states: {Follow: {run: follow, next: Rest}, Rest: {wait: 2 * unit_ms, next: Follow}}
-  SlowGuidanceFsm:
-    core: my_robot/Guidance
-    initial: Idle
-    states:
-      Idle: {run: read_inputs, next: [{if: has_new_goal, to: Planning}, W5]}
-      Planning: {run: compute_path, next: W5}
-      W5: {wait: 5 * unit_ms, next: Idle}
-"""
+ARM = arm("{at: my_robot/Point2D, home: geometry_msgs/msg/Point}")
 ROBOT = """\
 mauve: 1
 components:

@@ -12,7 +12,7 @@ from mauve_rt.analysis.locks import with_measured_holds
 from mauve_rt.analysis.machines import ExecutionTime, Hold, Machine
 from mauve_rt.analysis.obstacles import assumptions_about
 from mauve_rt.analysis.offsets import Grid
-from mauve_rt.analysis.plan import bounds_during
+from mauve_rt.analysis.plan import bounds_during, subjects_during
 from mauve_rt.analysis.threads import machines_of
 from mauve_rt.model.threads import ThreadInfo
 
@@ -434,5 +434,5 @@ def test_offsets_do_not_count_while_a_change_is_made() -> None:
     before = [Subject.of(one) for one in two()]
     after = [before[0], Subject.of(two(deadline_ns=7 * MS)[1])]
     assert all(one.meets_deadline for each in (before, after) for one in bounds_of(each).values())
-    during = bounds_during(before, after, {})["low"]
+    during = bounds_during(subjects_during(before, after, {}), before, after, {})["low"]
     assert (during.response_ns, during.by, during.meets_deadline) == (9 * MS, "", False)

@@ -16,7 +16,7 @@ from mauve_rt.analysis.digraph import DigraphTask
 from mauve_rt.analysis.digraph_times import Component
 
 IN_NS, UNTIL_NS = Staircase.in_ns, Staircase.until_ns
-WITHIN, FINISH_NS = digraph_times._within, digraph_times._Delay.finish_ns
+WITHIN, FINISH_NS = digraph_times._within, digraph_times.Delay.finish_ns
 
 
 def no_blocking(_one: Component, _components: Sequence[Component]) -> int:
@@ -42,10 +42,10 @@ def half_open_interval(work: Staircase, instant_ns: int) -> int:
     return IN_NS(work, instant_ns)
 
 
-def own_release(delay: digraph_times._Delay, path: Path) -> int:
+def own_release(delay: digraph_times.Delay, path: Path) -> int:
     """As if the kernel queued jobs, not threads: none that is released later goes first."""
     equal_ns = sum(other.until_ns(path.release_ns) for other in delay.equal)
-    return FINISH_NS(digraph_times._Delay(delay.higher, (), delay.blocking_ns + equal_ns), path)
+    return FINISH_NS(digraph_times.Delay(delay.higher, (), delay.blocking_ns + equal_ns), path)
 
 
 MUTANTS: dict[str, tuple[object, str, object]] = {
@@ -55,7 +55,7 @@ MUTANTS: dict[str, tuple[object, str, object]] = {
     "only the first job of the window": (digraph_times, "_within", first_job_only),
     "half-open interval turned round": (Staircase, "in_ns", closed_interval),
     "closed interval turned round": (Staircase, "until_ns", half_open_interval),
-    "jobs queued, not threads": (digraph_times._Delay, "finish_ns", own_release),
+    "jobs queued, not threads": (digraph_times.Delay, "finish_ns", own_release),
 }
 OUTSIDE_THE_ORACLE = {  # pyRTA has none of them
     "closed interval turned round",

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from arm_model import arm
 
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.modelling.generate import generated, interfaces, python_module
@@ -10,41 +11,7 @@ from mauve_rt.modelling.loading import ModelLoader
 from mauve_rt.modelling.package_model import PackageModel
 
 GUIDANCE = Path(__file__).with_name("guidance.yaml")
-ARM = """\
-mauve_model: 1
-package: my_arm
-types:
-  Reach: {at: "my_robot/Point2D[<=4]"}
-shells:
-  ArmShell:
-    ports: {reach: {read: Reach}, goal: {write: my_robot/Point2D}}
-cores:
-  Arm:
-    shell: ArmShell
-    actions: [move]
-    state: {last: my_robot/Point2D}
-    implementations: {QuickArm: {wcet: {move: 1 ms}}}
-  Follower:
-    shell: my_robot/GuidanceShell
-    actions: [follow]
-    implementations: {Eager: {wcet: {follow: 2 ms}}}
-fsms:
-  ArmFsm:
-    core: Arm
-    initial: Move
-    states: {Move: {run: move, next: Rest}, Rest: {wait: 20 ms, next: Move}}
-  FollowerFsm:
-    core: Follower
-    initial: Follow
-    states: {Follow: {run: follow, next: Rest}, Rest: {wait: 2 * unit_ms, next: Follow}}
-  SlowGuidanceFsm:
-    core: my_robot/Guidance
-    initial: Idle
-    states:
-      Idle: {run: read_inputs, next: [{if: has_new_goal, to: Planning}, W5]}
-      Planning: {run: compute_path, next: W5}
-      W5: {wait: 5 * unit_ms, next: Idle}
-"""
+ARM = arm('{at: "my_robot/Point2D[<=4]"}')
 THIRD = """\
 mauve_model: 1
 package: my_third
