@@ -32,6 +32,7 @@ from micro import (
 )
 from mission import mission_rows
 from native import BenchmarkError
+from proof import proof_rows
 from reading import reading_rows
 from reconfiguration import (
     deployment_rows,
@@ -99,6 +100,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "recording-kept": kept_rows,
     "reading": reading_rows,
     "analysis": analysis_rows,
+    "proof": proof_rows,
     "mission": mission_rows,
     "links": links_rows,
 }

@@ -26,6 +26,8 @@ class Settings:
     recording_s: float
     kills: int
     read_records: tuple[int, ...]
+    proofs: int
+    proof_s: float
     priority: int = 80
     cpu: int = 0
 
@@ -50,6 +52,8 @@ QUICK = Settings(
     recording_s=2.0,
     kills=50,
     read_records=(1_000_000,),
+    proofs=4,
+    proof_s=10.0,
 )
 FULL = Settings(
     mode="full",
@@ -71,4 +75,6 @@ FULL = Settings(
     recording_s=6.0,
     kills=50,
     read_records=(1_000_000, 10_000_000),
+    proofs=20,
+    proof_s=60.0,
 )
