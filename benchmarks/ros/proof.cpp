@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A plug-in for benchmarks: components that use exactly the CPU time that their properties say, in states, guards and under a lock.
-#include <ctime>
-
 #include <cstdint>
+#include <ctime>
 #include <mutex>
 
 #include "mauve_rt/elements/types.hpp"
@@ -27,7 +26,8 @@ inline void use_cpu(std::int64_t us) {
 struct ProofShell : mauve::Shell {
   using Microseconds = mauve::Property<std::int64_t>;
 
-  Microseconds& period_us = structural("period_us", "of a wait; of a wait for events the least time between them");
+  Microseconds& period_us =
+      structural("period_us", "of a wait; of a wait for events the least time between them");
   Microseconds& long_us = structural("long_us", "of the other wait");
   Microseconds& first_us = cost("first_us", "that state First uses");
   Microseconds& second_us = cost("second_us", "that state Second uses");
@@ -40,10 +40,15 @@ struct ProofShell : mauve::Shell {
  private:
   Microseconds& structural(const char* name, const char* description) {
     return property(name, std::int64_t{10'000},
-                    {.unit = "us", .description = description, .minimum = 1, .maximum = 1e9, .structural = mauve::ReadBy::fsm});
+                    {.unit = "us",
+                     .description = description,
+                     .minimum = 1,
+                     .maximum = 1e9,
+                     .structural = mauve::ReadBy::fsm});
   }
   Microseconds& cost(const char* name, const char* description) {
-    return property(name, std::int64_t{0}, {.unit = "us", .description = description, .minimum = 0, .maximum = 1e9});
+    return property(name, std::int64_t{0},
+                    {.unit = "us", .description = description, .minimum = 0, .maximum = 1e9});
   }
 };
 
@@ -126,7 +131,8 @@ struct ProofGuarded : ProofFsm {
 struct ProofEvents : ProofFsm {
   void define() override {
     mauve::State& work = first();
-    mauve::State& await = wait_event("Await", shell().in, mauve::kForever, mauve::us_to_ns(shell().period_us));
+    mauve::State& await =
+        wait_event("Await", shell().in, mauve::kForever, mauve::us_to_ns(shell().period_us));
     set_initial(await);
     next(await, work);
     next(work, await);
