@@ -19,13 +19,14 @@ from itertools import takewhile
 
 from mauve_rt.analysis.blocking import blocking_ns
 from mauve_rt.analysis.critical_section import CriticalSection
-from mauve_rt.analysis.demand import Demand, Path, paths, utilization_of
+from mauve_rt.analysis.demand import Demand, Path, Together, paths, utilization_of
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.digraph_times import (
     Component,
     Delay,
     DigraphTimes,
     JobTime,
+    Work,
     level_of,
     overload,
     window_ns,
@@ -107,7 +108,9 @@ def _times(
         load = sum(each, start=Fraction(0))
         if reason := overload(load, has_more=blocked_ns > 0 or jitter_ns > 0):
             return DigraphTimes(reason=reason, blocking_ns=blocked_ns)
-    delay = Delay([mixes[each] for each in higher], [mixes[each] for each in equal], blocked_ns)
+    delay = Delay(
+        _together([mixes[each] for each in higher]), _together([mixes[each] for each in equal]), blocked_ns
+    )
     try:
         return _worst([mixes[each] for each in (name, *higher, *equal)], delay, jitter_ns)
     except UnboundedError as error:
@@ -129,12 +132,12 @@ def _task(member: Member, *, is_new: bool) -> DigraphTask:
 
 def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int) -> DigraphTimes:
     """The longest of each job of the first one, over all instants of the change."""
-    own = mixes[0]
+    own, works = mixes[0], _together(mixes)
 
     def window_at_ns(change_ns: int) -> int:
         for mix in mixes:
             mix.change_at(change_ns)
-        return window_ns(mixes, delay.blocking_ns)
+        return window_ns(works, delay.blocking_ns)
 
     before_ns = window_at_ns(FOREVER_NS)
     longest: dict[Job, int] = {}
@@ -149,6 +152,12 @@ def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int) -> DigraphTime
             break
     jobs = tuple(JobTime(job, response_ns) for job, response_ns in longest.items())
     return DigraphTimes(jobs, blocking_ns=delay.blocking_ns, walls_ns=walls)
+
+
+def _together(mixes: "Sequence[_Mix]") -> list[Work]:
+    """Those that change, and all others as one."""
+    others = [mix.unchanged for mix in mixes if not mix.is_changed]
+    return [*(mix for mix in mixes if mix.is_changed), *([Together(others)] if others else [])]
 
 
 def _instants(mixes: "Sequence[_Mix]") -> Iterator[int]:
@@ -178,6 +187,8 @@ class _Mix:
         self._old_task = _task(member, is_new=False)
         self._new_task = _task(member, is_new=True)
         self._old, self._new = Demand(self._old_task), Demand(self._new_task)
+        self.unchanged = Demand(self._old_task, jitter_ns=jitter_ns)
+        """What it asks for if nothing of it changes."""
         self._handover_ns = member.handover_ns if isinstance(member, Participant) else 0
         self.states = _states(member)
         self._ahead = paths(self._old_task) if self.is_changed else iter(())
@@ -205,8 +216,6 @@ class _Mix:
         if length_ns <= 0:
             return 0
         until_ns = length_ns + self._jitter_ns
-        if not self.is_changed:
-            return self._old.in_ns(until_ns)
         work_ns = self._old.in_ns(min(until_ns, self.change_ns))
         for release_ns, before_ns in self._switches:
             if release_ns >= until_ns:

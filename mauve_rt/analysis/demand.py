@@ -8,7 +8,7 @@ function, a staircase.
 
 import heapq
 from bisect import bisect_left, bisect_right
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from typing import NamedTuple
 
@@ -69,79 +69,119 @@ def cost_of(job: Job) -> int:
 
 
 class Staircase:
-    """Work by the instants at which it is released, each of which comes up to `jitter_ns` late."""
+    """Work by the instants from which on it may be asked for."""
 
-    def __init__(self, jitter_ns: int) -> None:
-        self._jitter_ns = jitter_ns
-        self._releases_ns: list[int] = []
+    def __init__(self) -> None:
+        self._instants_ns: list[int] = []
         self._work_ns: list[int] = []  # all until then
 
-    def add(self, release_ns: int, work_ns: int) -> None:
-        """Up to and with this release; later ones are added later."""
-        self._releases_ns.append(release_ns)
+    def add(self, instant_ns: int, work_ns: int) -> None:
+        """Up to and with this instant; later ones are added later."""
+        self._instants_ns.append(instant_ns)
         self._work_ns.append(work_ns)
 
     def in_ns(self, length_ns: int) -> int:
-        """Of releases in a half-open interval of this length."""
+        """In a half-open interval of this length."""
         if length_ns <= 0:
             return 0
-        self._look_to(length_ns + self._jitter_ns)
-        return self._at(bisect_left(self._releases_ns, length_ns + self._jitter_ns))
+        self._look_to(length_ns)
+        return self._before(bisect_left(self._instants_ns, length_ns))
 
     def until_ns(self, instant_ns: int) -> int:
-        """Of releases in the closed [0, instant]."""
-        self._look_to(instant_ns + self._jitter_ns)
-        return self._at(bisect_right(self._releases_ns, instant_ns + self._jitter_ns))
+        """In the closed [0, instant]."""
+        self._look_to(instant_ns)
+        return self._before(bisect_right(self._instants_ns, instant_ns))
 
     def dominates(self, other: "Staircase") -> bool:
         """Whether it has no less work at any instant."""
         return all(
-            self._at(bisect_right(self._releases_ns, release_ns)) >= work_ns
-            for release_ns, work_ns in other.steps()
+            self._before(bisect_right(self._instants_ns, instant_ns)) >= work_ns
+            for instant_ns, work_ns in other.found()
         )
 
-    def steps(self) -> Iterator[tuple[int, int]]:
-        """Each release so far, and the work until then."""
-        return zip(self._releases_ns, self._work_ns, strict=True)
+    def found(self) -> Iterator[tuple[int, int]]:
+        """The instants so far, each with the work until then."""
+        return zip(self._instants_ns, self._work_ns, strict=True)
 
-    def _at(self, index: int) -> int:
-        return self._work_ns[index - 1] if index else 0
+    def steps(self, until_ns: int, *, after: int) -> list[tuple[int, int]]:
+        """At which instants more comes and how much, but for the first `after` ones."""
+        self._look_to(until_ns)
+        end = bisect_right(self._instants_ns, until_ns)
+        return [
+            (self._instants_ns[step], self._work_ns[step] - self._before(step)) for step in range(after, end)
+        ]
+
+    def _before(self, step: int) -> int:
+        return self._work_ns[step - 1] if step else 0
 
     def _look_to(self, instant_ns: int) -> None:
-        """All releases up to then are there."""
+        """All that comes up to then is there."""
+
+
+class Together(Staircase):
+    """What several ask for, as one: each question looks at all of them once."""
+
+    def __init__(self, parts: Sequence[Staircase]) -> None:
+        super().__init__()
+        self._parts = parts
+        self._taken = [0] * len(parts)  # steps of each that are in it
+        self._until_ns = -1
+
+    def _look_to(self, instant_ns: int) -> None:
+        if instant_ns <= self._until_ns:
+            return
+        found: list[tuple[int, int]] = []
+        for number, part in enumerate(self._parts):
+            steps = part.steps(instant_ns, after=self._taken[number])
+            self._taken[number] += len(steps)
+            found += steps
+        work_ns = self._before(len(self._work_ns))
+        for at_ns, more_ns in sorted(found):
+            work_ns += more_ns
+            self.add(at_ns, work_ns)
+        self._until_ns = instant_ns
 
 
 class Demand(Staircase):
     """The most that jobs of a task, released in an interval, ask for: whatever paths they are of.
 
-    in_ns() and until_ns() raise UnboundedError where there are too many paths to look at.
+    Each release comes up to `jitter_ns` late. Its answers raise UnboundedError where there are too many paths
+    to look at.
     """
 
     def __init__(self, task: DigraphTask, *, jitter_ns: int = 0) -> None:
-        super().__init__(jitter_ns)
-        self._task = task
+        super().__init__()
+        self._task, self._jitter_ns = task, jitter_ns
         self._paths = paths(task)
+        self._failure: UnboundedError | None = None
         self._ahead: Path | None = next(self._paths, None)
 
     def _look_to(self, instant_ns: int) -> None:
-        while self._ahead is not None and self._ahead.release_ns <= instant_ns:
+        while self._ahead is not None and self._ahead.release_ns <= instant_ns + self._jitter_ns:
+            if self._failure is not None:  # nothing is known of what comes after this one
+                raise self._failure
             if not self._work_ns or self._ahead.work_ns > self._work_ns[-1]:
-                self.add(self._ahead.release_ns, self._ahead.work_ns)
-            self._ahead = next(self._paths, None)
+                self.add(self._at_ns(self._ahead.release_ns), self._ahead.work_ns)
+            try:
+                self._ahead = next(self._paths, None)
+            except UnboundedError as error:
+                self._failure = error
+
+    def _at_ns(self, release_ns: int) -> int:
+        return max(release_ns - self._jitter_ns, 0)
 
     def of_each_path(self, until_ns: int, *, most: int) -> list[Staircase] | None:
         """One for each path that no other one dominates, up to then; None: there are more than `most`."""
         if len(self._task.jobs) == 1:
             return [self]
-        until_ns += self._jitter_ns
         found: list[Staircase] = []
-        for count, releases in enumerate(_all_paths(self._task, until_ns)):
+        for count, releases in enumerate(_all_paths(self._task, until_ns + self._jitter_ns)):
             if count >= _MOST_PATHS:
                 return None
-            one, work_ns = Staircase(self._jitter_ns), 0
+            one, work_ns = Staircase(), 0
             for release_ns, cost_ns in releases:
                 work_ns += cost_ns
-                one.add(release_ns, work_ns)
+                one.add(self._at_ns(release_ns), work_ns)
             if not any(other.dominates(one) for other in found):
                 found = [other for other in found if not one.dominates(other)] + [one]
         return found if len(found) <= most else None

@@ -31,11 +31,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from fractions import Fraction
 from itertools import product, takewhile
-from typing import Protocol
+from typing import Protocol, Self
 
 from mauve_rt.analysis.blocking import blocking_ns, shares_a_resource
 from mauve_rt.analysis.critical_section import CriticalSection
-from mauve_rt.analysis.demand import Demand, Path, Staircase, cost_of, paths, utilization_of
+from mauve_rt.analysis.demand import Demand, Path, Staircase, Together, cost_of, paths, utilization_of
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.errors import AnalysisError
 from mauve_rt.analysis.fixed_point import UnboundedError, least_time_ns
@@ -182,10 +182,10 @@ class _Window:
     def __init__(
         self, own: Demand, higher: Sequence[Demand], equal: Sequence[Demand], *, blocking_ns: int
     ) -> None:
-        self.length_ns = window_ns((own, *higher, *equal), blocking_ns)
-        self._most = Delay(higher, equal, blocking_ns)
+        self.length_ns = window_ns([Together((own, *higher, *equal))], blocking_ns)
+        self._most = Delay.of(higher, equal, blocking_ns)
         each = _of_each_path((*higher, *equal), self.length_ns)
-        self._delays = [Delay(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
+        self._delays = [Delay.of(one[: len(higher)], one[len(higher) :], blocking_ns) for one in each]
 
     def finish_ns(self, path: Path) -> int:
         """When the last job of a path is done at the latest, from the window's start on."""
@@ -231,6 +231,11 @@ class Delay:
     higher: Sequence[Work]
     equal: Sequence[Work]
     blocking_ns: int
+
+    @classmethod
+    def of(cls, higher: Sequence[Staircase], equal: Sequence[Staircase], blocking_ns: int) -> Self:
+        """Of tasks of higher and of equal priority."""
+        return cls([Together(higher)], [Together(equal)] if equal else [], blocking_ns)
 
     def finish_ns(self, path: Path) -> int:
         """When the last job of a path is done at the latest, from the window's start on."""
