@@ -9,10 +9,11 @@ from mauve_rt._kernel import PluginRegistry
 from mauve_rt.analysis.machines import ExecutionTime, Machine, State
 from mauve_rt.analysis.plan import Handovers
 from mauve_rt.analysis.study import Study, Surroundings, study, study_of_change
-from mauve_rt.cli.analyzed import Analyzed, analyzed, is_python_part
+from mauve_rt.cli.analyzed import Analyzed, analyzed
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.model import ArchitectureModel, PluginIndex
+from mauve_rt.model.component_machines import is_python_part
 from mauve_rt.model.file_kinds import file_kind
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.steps import Change, Step, load_change
