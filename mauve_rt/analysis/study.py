@@ -11,7 +11,7 @@ from mauve_rt.analysis.obstacles import unknown_costs
 from mauve_rt.analysis.plan import Handovers, bounds_during, subjects_during
 from mauve_rt.analysis.refutation import Measured, contradictions
 from mauve_rt.analysis.threads import machines_of
-from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text
+from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text, missing_of
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,14 @@ class Study:
     verdict: Verdict
     unknown: Sequence[str]
     """What is not known beside them, in words."""
+
+    @property
+    def missing(self) -> list[str]:
+        """What keeps it from being provable, each as `component: reason`; none where it is provable."""
+        if self.verdict.outcome is not Outcome.NOT_PROVABLE:
+            return []
+        subjects = [f"{one.name}: {why}" for one in missing_of(self.subjects) for why in one.obstacles]
+        return [*subjects, *(f"this computer: {why}" for why in self.unknown)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +90,9 @@ def study_of_change(before: Study, after: Study, handovers: Handovers, surroundi
     """
     subjects = subjects_during(before.subjects, after.subjects, handovers)
     wakeup_ns = surroundings.wakeup_ns
-    bounds = bounds_during(subjects, before.subjects, after.subjects, handovers, wakeup_ns=wakeup_ns)
+    bounds = bounds_during(
+        subjects, before.subjects, after.subjects, handovers, known=before.bounds, wakeup_ns=wakeup_ns
+    )
     verdict = judge(subjects, bounds, unknown=before.unknown, measured=surroundings.measured, searches=False)
     joined = Study(subjects, bounds, verdict, before.unknown)
     if found := _run_during(before, after, joined, handovers, wakeup_ns):
