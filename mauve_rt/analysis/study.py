@@ -11,6 +11,7 @@ from mauve_rt.analysis.obstacles import unknown_costs
 from mauve_rt.analysis.plan import Handovers, bounds_during, subjects_during
 from mauve_rt.analysis.refutation import Measured, contradictions
 from mauve_rt.analysis.threads import machines_of
+from mauve_rt.analysis.time_limit import optional_part
 from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text, missing_of
 
 
@@ -110,7 +111,9 @@ def _run_during(
             continue
         old, new = ({one.name: one for one in side.subjects if one.name in names} for side in (before, after))
         times = {name: ns for name, ns in handovers.items() if name in names and ns is not None}
-        found = change_witness(old, new, times, wakeup_ns=wakeup_ns)
+        found = None
+        with optional_part():
+            found = change_witness(old, new, times, wakeup_ns=wakeup_ns)
         if found is not None and found[0].missed is not None:
             schedule, change_ns = found
             priorities = {one.name: one.machine.priority for one in cpu}

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from mauve_rt.analysis.machines import Machine
 from mauve_rt.analysis.plan import Handovers
-from mauve_rt.analysis.study import Study, Surroundings
+from mauve_rt.analysis.study import Study, Surroundings, study
 from mauve_rt.cli.analyzed import Analyzed, analyzed
 from mauve_rt.control.change_timing import budget_ns, handovers_of, judged_change, with_times_of_core
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
@@ -49,6 +49,21 @@ class Planner:
             raise ValueError("a change is judged for an architecture file")
         self._model, self._now = found.model, now
         self._components, self._surroundings = components, surroundings
+
+    @classmethod
+    def of_architecture(cls, path: Path) -> "Planner":
+        """Of an architecture file with the times that it declares."""
+        found = analyzed(str(path), ())
+        if found.threads is None:
+            raise ValueError("an architecture file has threads")
+        surroundings = Surroundings(threads=found.threads)
+        now = study(found.components, surroundings)
+        return cls(found, now, found.components, surroundings)
+
+    @property
+    def now(self) -> Study:
+        """What is known of the architecture."""
+        return self._now
 
     def of_file(self, path: Path) -> Iterator[Plan]:
         """The changes of a file: of steps, of each rule, or to another architecture.

@@ -244,6 +244,11 @@ def _wrong_arguments(args: argparse.Namespace) -> str:
         return f"--overhead-ns: expected 0 or more, found {args.overhead_ns}"
     if args.write and (args.budget_from is None or not Path(args.target).is_file()):
         return "--write: expected an architecture FILE and --budget-from BAG"
+    return _wrong_target(args)
+
+
+def _wrong_target(args: argparse.Namespace) -> str:
+    """Of --plan and --alternatives."""
     is_file = Path(args.target).is_file() and not is_bag(Path(args.target)) and not args.model
     is_node = args.target.startswith("/") and not Path(args.target).exists()
     if args.alternatives and not is_file:

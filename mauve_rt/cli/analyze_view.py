@@ -80,13 +80,18 @@ def print_verdict(now: Study, assumptions: Sequence[str]) -> None:
 def print_plan(plan: "Plan") -> None:
     """Print the verdicts on a change; of one with a name the worse one."""
     if plan.change:
-        is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
-        worse = plan.during if is_sound else plan.after
-        when = "while that is made: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
-        _print_study(f"{plan.change}: {when}", worse)
+        _print_list(*verdict_of_plan(plan))
     else:
         _print_study("during the change: ", plan.during)
         _print_study("after it: ", plan.after)
+
+
+def verdict_of_plan(plan: "Plan") -> tuple[str, list[str]]:
+    """Of a change with a name: the worse one of its verdicts, and what is missing."""
+    is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
+    worse = plan.during if is_sound else plan.after
+    when = "while that is made: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
+    return f"{plan.change}: {when}{worse.verdict.sentence}", worse.missing
 
 
 def _print_study(head: str, study: Study) -> None:
