@@ -18,7 +18,7 @@ from mauve_rt.model.fragment import fragment
 from mauve_rt.model.steps import Change, Step, load_change
 from mauve_rt.model.threads import ThreadList, thread_list, uses_of
 from mauve_rt.supervision.rehearsal import before_and_after
-from mauve_rt.supervision.rules import RulesFile
+from mauve_rt.supervision.rules import Rule, RulesFile
 
 
 class Plan(NamedTuple):
@@ -77,9 +77,18 @@ class Planner:
             yield self._judged("", _by_file(path, self._model))
         elif kind is FileKind.RULES:
             for rule in RulesFile(path).rules.rules:
-                yield self._by_steps(f"when rule {rule.name} acts", path, Change(steps=list(rule.do)))
+                yield self.of_rule(path, rule)
         else:
             yield self._by_steps("", path, load_change(path))
+
+    def of_rule(self, path: Path, rule: Rule) -> Plan:
+        """The action of a rule of a file.
+
+        Raises:
+            ArchitectureFileError: the executor would refuse a step.
+
+        """
+        return self._by_steps(f"when rule {rule.name} acts", path, Change(steps=list(rule.do)))
 
     def alternatives(self) -> Iterator[Plan]:
         """Of each core that the file names as an alternative or a fallback.

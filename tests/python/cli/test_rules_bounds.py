@@ -15,7 +15,7 @@ BACK = "    undo: {for_s: 1.0}\n"
 
 
 def parts(out: list[str]) -> dict[str, float]:
-    return {what: float(ms) for ms, what in (line.split(" ms  ") for line in out[1:-1])}
+    return {what: float(ms) for ms, what in (line.split(" ms  ") for line in out if line[0] == " ")}
 
 
 def loaded(folder: Path, when: str, do: str = SWAP, more: str = "", name: str = "one") -> Rule:
