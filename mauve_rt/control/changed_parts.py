@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from mauve_rt._kernel import Architecture, ComponentDescription, Transaction
+from mauve_rt._kernel import Architecture, ComponentDescription, DescribedState, Transaction
 from mauve_rt.analysis.machines import Machine
 from mauve_rt.control.change_timing import with_times_of_core
 from mauve_rt.control.runtime import Runtime
@@ -133,9 +133,10 @@ class ChangedParts:
         }
         if known is not None and not (part.is_made or is_rewired or {*part.wires.values()} & {*moved}):
             return known
-        described, states = (part.before, part.before.states) if part.before is not None else (None, [])
-        if part.is_made or described is None:
+        if part.before is None or part.is_made:
             described, states = self._made(part)
+        else:
+            described, states = part.before, part.before.states
         types = {port.name: port.type for port in described.ports}
         ports = [
             live[name]
@@ -162,7 +163,7 @@ class ChangedParts:
         machine = Machine.of(told, is_python=is_python_part(told, self._runtime.index), kinds=kinds)
         return with_times_of_core(machine, told, part.model, self._runtime.registry)
 
-    def _made(self, part: _Part) -> tuple[ComponentDescription, Sequence[Any]]:
+    def _made(self, part: _Part) -> tuple[ComponentDescription, list[DescribedState]]:
         architecture = Architecture(self._runtime.registry)
         transaction = Transaction()
         names = {item.name for item in self._runtime.registry.describe_shell(part.shell).properties}

@@ -39,6 +39,15 @@ def test_in_the_executor(check: Check) -> None:
     assert out[0] == "quiet (in the executor): at most from the cause to the first release: 1261.000 ms"
 
 
+def test_the_timing_of_each_action_is_judged(check: Check) -> None:
+    _, out, _ = check(rule(), robot=ROBOT)
+    assert [line for line in out if line.startswith("when rule")] == [
+        "when rule quiet acts: not provable: something is missing of one, slow, told, this computer"
+    ]
+    _, out, _ = check(rule())
+    assert not any(line.startswith("when rule") for line in out)
+
+
 def test_in_the_supervisor(check: Check) -> None:
     status, out, errors = check(rule(more="    in: supervisor\n", undo=BACK), robot=ROBOT)
     assert (status, errors) == (0, [])

@@ -47,6 +47,7 @@ HALF = Step("replace_core", "one", "executor_tests/HalfTimed")
 BACKWARDS = Step("replace_core", "low", "executor_tests/Backwards")
 NOT_DECLARED = "core executor_tests/HalfTimed declares no time of is_enabled"
 
+HOUR_NS = 3600 * 10**9
 Running = Callable[[str], tuple[Control, SimulatedRuntime, Judge]]
 
 
@@ -65,8 +66,9 @@ SWAP = (
 
 
 @pytest.fixture
-def running(tmp_path: Path, plugin_prefix: Path) -> Iterator[Running]:
+def running(tmp_path: Path, plugin_prefix: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Running]:
     """running(TEXT): an architecture at work in virtual time, whose threads have all rights."""
+    monkeypatch.setattr("mauve_rt.control.timing.VERDICT_NS", HOUR_NS)  # also on a slow computer
     simulation = Simulation(trace=False)
 
     def run(text: str) -> tuple[Control, SimulatedRuntime, Judge]:
