@@ -218,7 +218,7 @@ def test_a_file_that_requires_what_it_does_not_have_is_warned_of(check: Check) -
     assert (status, len(out)) == (0, 1)
     [warning] = errors
     assert warning.startswith(
-        "robot:2:33: warning: the executor requires schedulable changes, and this file is not provable: "
+        "robot:2:32: warning: the executor requires schedulable changes, and this file is not provable: "
         "something is missing of this computer"
     )
     assert warning.endswith("robot says what to declare")
