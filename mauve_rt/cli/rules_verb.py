@@ -67,7 +67,7 @@ def _check(args: argparse.Namespace) -> int:
             periods = executor.periods_s()
             warnings += model_warnings(file, model, executor)
     _print_bounds(file, periods)
-    if model is not None and not found:
+    if model is not None:
         _print_verdicts(args.architecture, file)
     for problem in sorted(found, key=lambda each: (each.line, each.column)):
         _complain(file, problem)
