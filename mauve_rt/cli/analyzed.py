@@ -70,6 +70,7 @@ def _beside(machine: Machine, executor: str) -> Machine:
 
 def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:
     from mauve_rt.model import build, load_architecture, previewed_states  # noqa: PLC0415
+    from mauve_rt.model.component_machines import is_python_part  # noqa: PLC0415
     from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
     from mauve_rt.model.threads import thread_list, uses_of  # noqa: PLC0415
     from mauve_rt.modelling.loading import ModelLoader  # noqa: PLC0415
@@ -174,9 +175,9 @@ def of_trace(trace: "Trace") -> Analyzed:
 
 def _of_told(components: Iterable[Any], kinds: Mapping[str, str]) -> list[Machine]:
     from mauve_rt.model import PluginIndex  # noqa: PLC0415
+    from mauve_rt.model.component_machines import component_machines  # noqa: PLC0415
 
-    index = PluginIndex.installed()
-    return [Machine.of(part, is_python=is_python_part(part, index), kinds=kinds) for part in components]
+    return component_machines(components, kinds, PluginIndex.installed())
 
 
 def _modelled(model: "PackageModel") -> dict[str, bool]:
@@ -186,15 +187,3 @@ def _modelled(model: "PackageModel") -> dict[str, bool]:
     for core in content.cores.values():
         parts |= {name: bool(one.module) for name, one in core.implementations.items()}
     return {model.registered(name): is_python for name, is_python in parts.items()}
-
-
-def is_python_part(part: Any, index: Any, modelled: Mapping[str, bool] | None = None) -> bool | None:
-    """Whether one of its parts is in Python; None: not known. `modelled`: of parts that a model describes."""
-    known = modelled or {}
-    named = (("shell", part.shell), ("core", part.core), ("fsm", part.fsm))
-    plugins = [index.find(kind, name) for kind, name in named if name not in known]
-    if any(known.get(name) for _, name in named) or any(
-        each is not None and each.is_python for each in plugins
-    ):
-        return True
-    return None if None in plugins else False

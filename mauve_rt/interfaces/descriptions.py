@@ -18,6 +18,7 @@ from mauve_msgs.msg import (
     StepReport,
     TaskInfo,
     TaskList,
+    TimingVerdict,
     TraceArchitecture,
 )
 from mauve_msgs.msg import HeldElement as HeldElementMessage
@@ -33,10 +34,11 @@ from mauve_rt._kernel import (
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
+from mauve_rt.control.threads import threads_of
 from mauve_rt.control.wishes import step_of
 from mauve_rt.file_schema.words import cut, shown
 from mauve_rt.model.schema import PropertyValue
-from mauve_rt.model.threads import ThreadInfo, is_named, thread_list
+from mauve_rt.model.threads import ThreadInfo
 
 _PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
 _MAX_PRIORITY = 255
@@ -171,26 +173,13 @@ def task_list(
     *,
     others: Iterable[ThreadInfo] = (),
 ) -> Any:
-    """TaskList: the threads that the settings ask for, and each of `others` that is none of them.
-
-    Args:
-        runtime: what runs.
-        components: of the runtime.
-        uses: how threads that are no components use resources, as `uses_of`.
-        others: real-time threads of the process.
-
-    """
-    all_uses = {resource: {*sides} for resource, sides in uses.items()}
-    for name in runtime.model.recorded:
-        all_uses.setdefault(name, set()).add("records")
+    """TaskList; `uses` and `others`: as for `threads_of`."""
     has_bounds = any(state.max_execution_ns for part in components for state in part.states)
-    known = thread_list(runtime.model.executor, all_uses, components=len(components), has_bounds=has_bounds)
-    names = {each.name for each in known.tasks} | {part.name for part in components}
-    found = [each for each in others if not is_named(each.name, names)]
+    known = threads_of(runtime, components, uses, has_bounds=has_bounds, others=others)
     return TaskList(
         wakeup_ns=known.wakeup_ns,
         overhead_ns=known.overhead_ns,
-        tasks=[TaskInfo(**_as_fields(each)) for each in (*known.tasks, *found)],
+        tasks=[TaskInfo(**_as_fields(each)) for each in known.tasks],
     )
 
 
@@ -316,6 +305,11 @@ def step_reports(outcome: Outcome) -> list[Any]:
     """StepReport of every step."""
     lists = [(report, {"taken": list(report.taken), "left": list(report.left)}) for report in outcome.report]
     return [StepReport(**{**vars(report), **of_state}) for report, of_state in lists]
+
+
+def timing_verdicts(outcome: Outcome) -> list[Any]:
+    """TimingVerdict of each verdict."""
+    return [TimingVerdict(**{**vars(verdict), "missing": [*verdict.missing]}) for verdict in outcome.timing]
 
 
 def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, instance_id: str) -> Any:

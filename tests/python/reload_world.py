@@ -10,6 +10,7 @@ from rebuilt_package import RebuiltPackage
 
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.control.control import Control
+from mauve_rt.control.judging import Judge
 from mauve_rt.control.requests import Outcome, ReloadOrder, Request, Step
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
@@ -21,6 +22,7 @@ MS = 1_000_000
 WORLDS = ("virtual time", "threads")
 FILE = """\
 mauve: 1
+executor: {EXECUTOR}
 components:
   loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
          alternatives: ALTERNATIVES}
@@ -82,10 +84,11 @@ class World:
         return next(int(info.generation) for info in component_infos(self.runtime) if info.name == name)
 
 
-def make_world(kind: str, folder: Path, alternatives: str) -> Iterator[World]:
-    """The architecture, until the test ends. `kind`: "threads" or "virtual time"."""
+def make_world(kind: str, folder: Path, alternatives: str, executor: str = "") -> Iterator[World]:
+    """The architecture, until the test ends. `kind`: as in WORLDS; `executor`: its settings."""
     path = folder / "robot.yaml"
-    path.write_text(FILE.replace("ALTERNATIVES", alternatives), encoding="utf-8")
+    text = FILE.replace("ALTERNATIVES", alternatives).replace("EXECUTOR", executor)
+    path.write_text(text, encoding="utf-8")
     if kind == "threads":
         runtime = Runtime(lambda: load_architecture(path))
         run = _sleep
@@ -95,7 +98,7 @@ def make_world(kind: str, folder: Path, alternatives: str) -> Iterator[World]:
         run = _advance(simulation)
     runtime.configure()
     runtime.activate()
-    world = World(runtime, Control(runtime), run)
+    world = World(runtime, Control(runtime, judge=Judge(runtime)), run)
     while world.sum()[1] == 0:
         run(10)
     yield world

@@ -260,3 +260,27 @@ def test_the_file_may_be_overwritten_while_its_copy_runs(world: World, rebuilt: 
         file.write(os.urandom(rebuilt.library.stat().st_size))
     assert world.mean_step() == 2.0
     assert not world.reload().success
+
+
+@pytest.mark.parametrize("requirement", ["true", "warn"])
+def test_a_reload_is_judged_and_the_way_back_is_not(
+    rebuilt: RebuiltPackage, tmp_path: Path, requirement: str
+) -> None:
+    """Nothing is declared here, so nothing is proved."""
+    settings = f"require_schedulable: {requirement}"
+    made = make_world("virtual time", tmp_path, "[]", settings)
+    world = next(made)
+    rebuilt.build("STEP=2.0")
+    outcome = world.reload()
+    assert "during the change: not provable: something is missing of loop, " in outcome.message
+    if requirement == "true":
+        assert outcome.code is Code.NOT_SCHEDULABLE
+        assert world.mean_step() == 1.0
+        assert world.generation() == 1
+    else:
+        assert outcome.code is Code.OK
+        assert world.mean_step() == 2.0
+        back = world.reload(back=True)
+        assert back.code is Code.OK
+        assert "warning" not in back.message
+    assert [*made] == []
