@@ -17,6 +17,14 @@ bool is_kind(const TraceRecord& record, TraceKind kind) noexcept {
   return record.kind == static_cast<std::uint16_t>(kind);
 }
 
+/// A component votes for a change, or adopts or takes new parts. What it executes for that is in no bound.
+bool is_changing(const TraceDrain& drain) {
+  return std::ranges::any_of(drain.records, [](const TraceRecord& record) {
+    return is_kind(record, TraceKind::parked) || is_kind(record, TraceKind::armed) ||
+           is_kind(record, TraceKind::reconfiguration);
+  });
+}
+
 }  // namespace
 
 bool JobWatch::watch(const std::vector<JobBound>& bounds, std::uint64_t revision, time_ns_t since_ns) {
@@ -72,14 +80,6 @@ std::vector<JobFigures> JobWatch::figures() const {
 std::vector<BoundViolation> JobWatch::take_violations() {
   const LockGuard lock(mutex_);
   return std::exchange(violations_, {});
-}
-
-/// A component votes for a change, or adopts or takes new parts. What it executes for that is in no bound.
-bool JobWatch::is_changing(const TraceDrain& drain) const {
-  return std::ranges::any_of(drain.records, [](const TraceRecord& record) {
-    return is_kind(record, TraceKind::parked) || is_kind(record, TraceKind::armed) ||
-           is_kind(record, TraceKind::reconfiguration);
-  });
 }
 
 void JobWatch::withdraw() {

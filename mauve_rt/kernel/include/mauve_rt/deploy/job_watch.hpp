@@ -32,7 +32,7 @@ struct BoundViolation {
   time_ns_t instant_ns{0};
   time_ns_t response_ns{0};
   std::uint64_t count{0};
-  std::vector<TraceRecord> records;  // of all components, from a while before the instant to the end of the job
+  std::vector<TraceRecord> records{};  // of all components, from a while before the instant to the end of the job
 
   time_ns_t excess_ns() const noexcept { return response_ns - job.bound_ns; }
 };
@@ -76,7 +76,6 @@ class JobWatch {
     time_ns_t end_ns{0};
   };
 
-  bool is_changing(const TraceDrain& drain) const;
   void withdraw() MAUVE_REQUIRES(mutex_);
   void follow(const TraceRecord& record) MAUVE_REQUIRES(mutex_);
   void judge(std::uint16_t number, const Current& job, std::uint32_t until, time_ns_t end_ns)
