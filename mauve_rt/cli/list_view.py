@@ -106,9 +106,11 @@ def bounds_table(components: Iterable[Any]) -> Table:
         table.add_column(column, no_wrap=True, justify="right")
     for component in components:
         for job in component.bounds:
-            first = [] if [job.after] == job.states[:1] else [job.after]  # a first job begins in its state
+            is_first = [job.after] == job.states[:1]  # after a start: it begins in its state
+            if is_first and not job.jobs:
+                continue
             violations = f"[bold red]{job.violations}[/]" if job.violations else "0"
-            way = " -> ".join([*first, *job.states, job.until])
+            way = " -> ".join([*([] if is_first else [job.after]), *job.states, job.until])
             table.add_row(component.name, way, duration(job.longest_ns), duration(job.bound_ns), violations)
     return table
 

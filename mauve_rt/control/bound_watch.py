@@ -3,16 +3,15 @@
 Import this module only to watch: it loads the analysis.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 from mauve_rt._kernel import BoundViolation, JobBound
-from mauve_rt.analysis.bounds import Bound
-from mauve_rt.analysis.digraph import START
+from mauve_rt.analysis.bounds import jobs_by_waits
 from mauve_rt.analysis.digraph_times import JobTime
 from mauve_rt.analysis.excess import Excess, Term, largest_excess
-from mauve_rt.analysis.machines import Machine, in_ms
+from mauve_rt.analysis.machines import in_ms
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.timing import Timed, Timing
 from mauve_rt.counts import counted
@@ -122,7 +121,11 @@ class BoundWatch:
             return
         machines = {one.name: one for one in timed.components}
         is_known = not timed.study.unknown
-        self._jobs = dict(_jobs(machines, timed.study.bounds)) if is_known else {}
+        self._jobs = {
+            (name, *waits): one
+            for name, bound in (timed.study.bounds.items() if is_known else ())
+            for waits, one in jobs_by_waits(machines[name], bound).items()
+        }
         bounds = [
             JobBound(component=component, after=after, until=until, bound_ns=one.response_ns)
             for (component, after, until), one in self._jobs.items()
@@ -148,11 +151,3 @@ class BoundWatch:
             return Excess(Term.REST, "", found.response_ns - found.job.bound_ns, 0)
         wakeup_ns = timed.surroundings.wakeup_ns
         return largest_excess(job, jobs, machines, bound_ns=found.job.bound_ns, wakeup_ns=wakeup_ns)
-
-
-def _jobs(machines: Mapping[str, Machine], bounds: Mapping[str, Bound]) -> Iterator[tuple[_Key, JobTime]]:
-    for name, bound in bounds.items():
-        for one in bound.jobs:
-            initial = next((state.name for state in machines[name].states if state.is_initial), "")
-            after = initial if one.job.after == START else one.job.after
-            yield (name, after, one.job.until), one
