@@ -64,23 +64,18 @@ class Excess(NamedTuple):
     @property
     def text(self) -> str:
         """In words."""
-        took, declared = in_ms(self.took_ns), f"{in_ms(self.declared_ns)} is declared"
+        figures = f"took {in_ms(self.took_ns)} ({in_ms(self.declared_ns)} declared)"
         match self.term:
             case Term.EXECUTION:
-                return (
-                    f"execution of {self.element} took {took}, and {declared} (or a thread that is not in "
-                    "the model took its CPU)"
-                )
+                return f"execution of {self.element} {figures}, or a thread outside the model had its CPU"
             case Term.GUARD:
-                return f"guards of {self.element} took {took}, and {declared}"
+                return f"guards of {self.element} {figures}"
             case Term.BLOCKING:
-                return f"the lock of {self.element} was held by another user for {took}, and {declared}"
+                return f"waiting for the lock of {self.element} {figures}"
             case Term.WAKE_UP:
-                return f"wake-up of {self.element} took {took}, and {declared}"
-        return (
-            f"a foreign thread or overhead took {took}: no declared time of the components is exceeded "
-            "by as much"
-        )
+                return f"wake-up of {self.element} {figures}"
+        took = f"a foreign thread or overhead took {in_ms(self.took_ns)}"
+        return f"{took}: no component exceeded its declared times by as much"
 
 
 def largest_excess(

@@ -51,10 +51,10 @@ class Violation(NamedTuple):
     @property
     def message(self) -> str:
         """In words."""
-        took = f"{self.after} -> {self.until} took {in_ms(self.response_ns)} from its instant"
-        more = f" ({counted(self.count, 'job')} above their bound since the last message)"
+        took = f"{self.after} -> {self.until} took {in_ms(self.response_ns)}"
+        more = f"; {counted(self.count, 'job')} above the bound since the last message"
         return (
-            f"component '{self.component}': {took}, its bound is {in_ms(self.bound_ns)}: {self.excess.text}"
+            f"component '{self.component}': {took} (bound {in_ms(self.bound_ns)}): {self.excess.text}"
             f"{more if self.count > 1 else ''}"
         )
 

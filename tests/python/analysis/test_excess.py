@@ -41,7 +41,7 @@ def largest(own: TracedJob, *others: TracedJob, bound_ms: float = 4, wakeup_ms: 
 def test_its_own_execution() -> None:
     found = largest(job("own", begin=0, end=5))
     assert found == Excess(Term.EXECUTION, "own.Work", 5 * MS, 2 * MS)
-    assert found.text.startswith("execution of own.Work took 5.000 ms, and 2.000 ms is declared")
+    assert found.text.startswith("execution of own.Work took 5.000 ms (2.000 ms declared)")
 
 
 def test_preemption_is_no_time_of_its_own_but_of_the_other_component() -> None:

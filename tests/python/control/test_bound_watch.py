@@ -96,7 +96,7 @@ def test_in_virtual_time_each_job_is_judged(tmp_path: Path, plugin_prefix: Path)
     assert found["slow"].excess[:3] == (Term.EXECUTION, "slow.Count", 12 * MS)
     assert found["slow"].count > 1
     assert found["urgent"].excess[:3] == (Term.WAKE_UP, "urgent", 11 * MS)
-    assert "above their bound since the last message" in found["slow"].message
+    assert "jobs above the bound since the last message" in found["slow"].message
     (bound,) = (one for one in watch.bounds()["slow"] if one.after == "Pause")
     assert (bound.longest_ns, bound.violations) == (12 * MS, bound.jobs)
 
