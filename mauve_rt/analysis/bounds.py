@@ -89,9 +89,7 @@ def jobs_by_waits(machine: Machine, bound: Bound) -> dict[tuple[str, str], JobTi
     The first job after a start follows no wait: a trace names the initial state.
     """
     initial = next((state.name for state in machine.states if state.is_initial), "")
-    return {
-        (initial if one.job.after == START else one.job.after, one.job.until): one for one in bound.jobs
-    }
+    return {(initial if one.job.after == START else one.job.after, one.job.until): one for one in bound.jobs}
 
 
 def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, Bound]:

@@ -79,7 +79,12 @@ class Excess(NamedTuple):
 
 
 def largest_excess(
-    job: TracedJob, jobs: Sequence[TracedJob], machines: Mapping[str, Machine], *, bound_ns: int, wakeup_ns: int
+    job: TracedJob,
+    jobs: Sequence[TracedJob],
+    machines: Mapping[str, Machine],
+    *,
+    bound_ns: int,
+    wakeup_ns: int,
 ) -> Excess:
     """The term of a job that exceeded its declared time by most.
 
@@ -101,9 +106,7 @@ def _excesses(
     job: TracedJob, jobs: Sequence[TracedJob], machines: Mapping[str, Machine], wakeup_ns: int
 ) -> Iterator[Excess]:
     own = machines[job.component]
-    here = [
-        each for each in jobs if each.component in machines and machines[each.component].cpus == own.cpus
-    ]
+    here = [each for each in jobs if each.component in machines and machines[each.component].cpus == own.cpus]
     urgent = _intervals(here, machines, from_priority=own.priority, but=job.component)
     late_ns = _free_ns(Interval(job.ready_ns, job.begin_ns), urgent)
     yield Excess(Term.WAKE_UP, job.component, late_ns, wakeup_ns)

@@ -30,7 +30,13 @@ _WAIT_FREE_KINDS = ("shared_data", "latest_value", "ring_buffer")  # the other k
 def print_components(reply: Any, out: Console | None = None) -> None:
     """A ListComponents reply: tables, authors of changes, faults, states that last, what real time lacks."""
     out = out or console()
-    for table in (_components(reply), bounds_table(reply.components), _cores(reply), _connections(reply), _memory(reply)):
+    for table in (
+        _components(reply),
+        bounds_table(reply.components),
+        _cores(reply),
+        _connections(reply),
+        _memory(reply),
+    ):
         if table.row_count:
             out.print(table)
     for name, element, author in _authors(reply):

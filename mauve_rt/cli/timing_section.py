@@ -27,9 +27,8 @@ def timing_section(analysis: Analysis) -> Section | None:
     for name, bound in now.bounds.items():
         measured = job_response_times(analysis.trace, name) if name in analysis.statistics else {}
         for (after, until), one in jobs_by_waits(machines[name], bound).items():
-            times_ns = measured.get((after, until), ())
-            if len(times_ns):
-                rows.append(_row(name, (after, until), one, distribution(times_ns)))
+            if (after, until) in measured:
+                rows.append(_row(name, (after, until), one, distribution(measured[after, until])))
     if not rows:
         return None
     note = (

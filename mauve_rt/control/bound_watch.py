@@ -1,4 +1,4 @@
-"""Bounds of a running executor, watched: computed for each revision, and compared with each job by the kernel.
+"""Watched bounds of a running executor: computed for each revision, compared with each job by the kernel.
 
 Import this module only to watch: it loads the analysis.
 """
@@ -45,17 +45,17 @@ class Violation(NamedTuple):
     instant_ns: int
     response_ns: int
     bound_ns: int
-    count: int
+    jobs: int
     excess: Excess
 
     @property
     def message(self) -> str:
         """In words."""
         took = f"{self.after} -> {self.until} took {in_ms(self.response_ns)}"
-        more = f"; {counted(self.count, 'job')} above the bound since the last message"
+        more = f"; {counted(self.jobs, 'job')} above the bound since the last message"
         return (
             f"component '{self.component}': {took} (bound {in_ms(self.bound_ns)}): {self.excess.text}"
-            f"{more if self.count > 1 else ''}"
+            f"{more if self.jobs > 1 else ''}"
         )
 
 
@@ -132,7 +132,9 @@ class BoundWatch:
         ]
         self._timed = timed
         if bounds:
-            runtime.host.watch_jobs(bounds, revision)  # refused while a change is open: the next look asks again
+            runtime.host.watch_jobs(
+                bounds, revision
+            )  # refused while a change is open: the next look asks again
         else:
             runtime.host.end_job_watch()
 

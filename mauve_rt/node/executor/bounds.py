@@ -1,4 +1,4 @@
-"""The bounds of an executor, watched by a thread of its own: ~/violations, the log, and figures for others."""
+"""Watches the bounds of an executor in a thread of its own: ~/violations, the log, figures of each job."""
 
 import threading
 from collections.abc import Callable
@@ -104,6 +104,6 @@ class WatchedBounds:
             element=one.excess.element,
             took_ns=one.excess.took_ns,
             declared_ns=one.excess.declared_ns,
-            count=one.count,
+            count=one.jobs,
             message=one.message,
         )

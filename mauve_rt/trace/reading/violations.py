@@ -14,7 +14,7 @@ class Violation(NamedTuple):
     instant_ns: int
     response_ns: int
     bound_ns: int
-    count: int
+    jobs: int
     message: str
 
     @property
@@ -39,5 +39,11 @@ def _of_messages(messages: Iterable[Any], components: Sequence[str]) -> Iterator
         for component in components:
             owner, _, name = component.rpartition("/")
             if name == told.component and (not owner or f"/{owner}/" in one.topic):
-                figures = map(int, (told.instant_ns, told.response_ns, told.bound_ns, told.count))
-                yield Violation(component, *figures, str(told.message))
+                yield Violation(
+                    component,
+                    instant_ns=int(told.instant_ns),
+                    response_ns=int(told.response_ns),
+                    bound_ns=int(told.bound_ns),
+                    jobs=int(told.count),
+                    message=str(told.message),
+                )

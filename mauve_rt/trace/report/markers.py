@@ -1,4 +1,4 @@
-"""Single events on a component's row: overruns, faults, stops, starts, marks of the user, jobs above a bound."""
+"""Single events on a component's row: overruns, faults, stops, starts, marks, jobs above a bound."""
 
 from collections.abc import Iterable
 from typing import NamedTuple
@@ -46,7 +46,7 @@ def markers_of(records: Records, violations: Iterable[Violation] = ()) -> list[M
 def _above_bound(violations: list[Violation]) -> Array:
     entries = np.zeros(len(violations), MARKER)
     entries["time_ns"] = [one.end_ns for one in violations]
-    entries["number"] = [one.count for one in violations]
+    entries["number"] = [one.jobs for one in violations]
     entries["value"] = [one.excess_ns for one in violations]
     entries["name"] = NO_NAME
     return entries if len(entries) <= MOST else _merged(entries)

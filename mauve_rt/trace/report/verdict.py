@@ -94,7 +94,7 @@ def _wrong(analysis: Analysis, machine: Machine) -> Iterator[str]:
     if analysis.misses:
         yield counted(len(analysis.misses), "missed deadline")
     if analysis.violations:
-        yield counted(sum(one.count for one in analysis.violations), "job") + " above a proved bound"
+        yield counted(sum(one.jobs for one in analysis.violations), "job") + " above a proved bound"
     if overruns:
         releases = counted(sum(one.releases for one in found), "release")
         least = "at least " if analysis.trace.lost else ""

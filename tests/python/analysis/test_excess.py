@@ -10,9 +10,7 @@ def component(name: str, priority: int, *, cpu: int = 0, guard_ms: float = 0.0) 
     """Works for 2 ms in each period of 10 ms, by its declared times."""
     states = (
         execution("Work", "Pause", wcet_ms=2, initial=True),
-        wait("Pause", "Work", "Work", ms=10, wcet_ms=guard_ms)
-        if guard_ms
-        else wait("Pause", "Work", ms=10),
+        wait("Pause", "Work", "Work", ms=10, wcet_ms=guard_ms) if guard_ms else wait("Pause", "Work", ms=10),
     )
     return machine(*states, name=name, priority=priority, cpus=[cpu], ports=connected(map=1))
 

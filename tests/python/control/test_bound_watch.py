@@ -22,10 +22,13 @@ executor: {wakeup_us: 2000, overhead_ns: 100000}
 components:
 """
 COUNTER = "shell: executor_tests/CounterShell, fsm: executor_tests/CounterFsm, cpus: [0]"
-LOCKING = """shell: executor_tests/LockingShell, core: executor_tests/Locking, fsm: executor_tests/LockingFsm, \
-cpus: [0], states: {Lock: {wcet_ns: 100000}}"""
+LOCKING = (
+    "shell: executor_tests/LockingShell, core: executor_tests/Locking, fsm: executor_tests/LockingFsm, "
+    "cpus: [0], states: {Lock: {wcet_ns: 100000}}"
+)
 IN_VIRTUAL_TIME = f"""{HEAD}
-  urgent: {{{COUNTER}, core: executor_tests/Counter, priority: 80, offset_ms: 1, properties: {{period_ms: 40}},
+  urgent: {{{COUNTER}, core: executor_tests/Counter, priority: 80, offset_ms: 1,
+           properties: {{period_ms: 40}},
            states: {{Count: {{wcet_ns: 2000000, simulated_execution_ns: 1000000}}}}}}
   slow: {{{COUNTER}, core: executor_tests/Counter, priority: 40, properties: {{period_ms: 20}},
          states: {{Count: {{wcet_ns: 6000000, simulated_execution_ns: 12000000}}}}}}
@@ -94,7 +97,7 @@ def test_in_virtual_time_each_job_is_judged(tmp_path: Path, plugin_prefix: Path)
     assert run_to(205) == []  # records of others may come with the next drain
     found = {one.component: one for one in run_to(206)}
     assert found["slow"].excess[:3] == (Term.EXECUTION, "slow.Count", 12 * MS)
-    assert found["slow"].count > 1
+    assert found["slow"].jobs > 1
     assert found["urgent"].excess[:3] == (Term.WAKE_UP, "urgent", 11 * MS)
     assert "jobs above the bound since the last message" in found["slow"].message
     (bound,) = (one for one in watch.bounds()["slow"] if one.after == "Pause")
@@ -103,8 +106,8 @@ def test_in_virtual_time_each_job_is_judged(tmp_path: Path, plugin_prefix: Path)
 
 def test_one_that_executes_longer_than_declared_is_named(runtime_of: Callable[[str], Runtime]) -> None:
     runtime = runtime_of(f"""{HEAD}
-  spinning: {{{COUNTER}, core: executor_tests/Spinning, priority: 60, properties: {{period_ms: 40, step: 8.0}},
-             states: {{Count: {{wcet_ns: 1000000}}}}}}
+  spinning: {{{COUNTER}, core: executor_tests/Spinning, priority: 60,
+             properties: {{period_ms: 40, step: 8.0}}, states: {{Count: {{wcet_ns: 1000000}}}}}}
 """)
     with running(runtime) as watch:
         require_fifo(runtime)
@@ -130,9 +133,7 @@ connections:
 """)
     with running(runtime) as watch:
         require_fifo(runtime)
-        found = violations(
-            watch, lambda one: one.component == "high" and one.excess.term is Term.BLOCKING
-        )
+        found = violations(watch, lambda one: one.component == "high" and one.excess.term is Term.BLOCKING)
         worst = next(one for one in found if one.excess.term is Term.BLOCKING)
         assert worst.excess.element == "vault"
         assert worst.excess.declared_ns == 100_000

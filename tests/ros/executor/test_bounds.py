@@ -18,8 +18,9 @@ FILE = """\
 mauve: 1
 executor: {namespace: /robot_1, wakeup_us: 2000, overhead_ns: 100000}
 components:
-  spinning: {shell: executor_tests/CounterShell, core: executor_tests/Spinning, fsm: executor_tests/CounterFsm,
-             cpus: [0], priority: 60, properties: {period_ms: 40, step: 8.0}, states: {Count: {wcet_ns: 1000000}}}
+  spinning: {shell: executor_tests/CounterShell, core: executor_tests/Spinning,
+             fsm: executor_tests/CounterFsm, cpus: [0], priority: 60, properties: {period_ms: 40, step: 8.0},
+             states: {Count: {wcet_ns: 1000000}}}
 """
 
 
