@@ -250,13 +250,15 @@ void bind_host(py::module_& module) {
                     "The wait that it follows; of the first job after a start the initial state.")
       .def_readonly("until", &JobBound::until, "The wait that it leads to.")
       .def_readonly("bound_ns", &JobBound::bound_ns, "From the job's instant to its wait.");
-  py::class_<JobFigures>(module, "JobFigures", "What was measured of a kind of job since its bound is watched.")
+  py::class_<JobFigures>(module, "JobFigures",
+                         "What was measured of a kind of job since its bound is watched.")
       .def_readonly("job", &JobFigures::job)
       .def_readonly("jobs", &JobFigures::jobs, "How many came to their wait.")
       .def_readonly("violations", &JobFigures::violations, "How many of them took longer than the bound.")
       .def_readonly("longest_ns", &JobFigures::longest_ns);
-  py::class_<BoundViolation>(module, "BoundViolation",
-                             "Jobs of a component that took longer than their bound, with times of the worst one.")
+  py::class_<BoundViolation>(
+      module, "BoundViolation",
+      "Jobs of a component that took longer than their bound, with times of the worst one.")
       .def_readonly("job", &BoundViolation::job)
       .def_readonly("instant_ns", &BoundViolation::instant_ns)
       .def_readonly("response_ns", &BoundViolation::response_ns)
@@ -424,7 +426,8 @@ Waits up to phase_timeout_ns for the next release to measure phase_actual_ns.)")
            R"(Compare each job from now on with its bound, until the architecture changes.
 
 False: it has another revision, or a change is open. Unless collect_trace() asks for the trace, its records are lost.)")
-      .def("end_job_watch", &PyHost::end_job_watch, Unlocked(), "Watch no bounds, and take no records for it.")
+      .def("end_job_watch", &PyHost::end_job_watch, Unlocked(),
+           "Watch no bounds, and take no records for it.")
       .def(
           "watches_jobs", [](PyHost& self) { return self.job_watch().holds(); }, Unlocked(),
           "Whether bounds are watched: not after a change, until they are given again.")

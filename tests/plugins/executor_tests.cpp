@@ -654,7 +654,8 @@ class Lamp final : public mauve::Resource {
 
 /// Executes for `hold_ms` under the lock of a vault.
 struct LockingShell : mauve::Shell {
-  mauve::Property<double>& hold_ms = property("hold_ms", 0.0, {.unit = "ms", .minimum = 0.0, .maximum = 100.0});
+  mauve::Property<double>& hold_ms =
+      property("hold_ms", 0.0, {.unit = "ms", .minimum = 0.0, .maximum = 100.0});
   mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
   mauve::CallPort<void(double)>& vault = call_port<void(double)>("vault", "executor_tests/Hold");
 };

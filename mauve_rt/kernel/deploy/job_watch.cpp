@@ -73,6 +73,7 @@ bool JobWatch::holds() const {
 std::vector<JobFigures> JobWatch::figures() const {
   const LockGuard lock(mutex_);
   std::vector<JobFigures> all;
+  all.reserve(followed_.size());
   for (const Followed& one : followed_) all.push_back(one.figures);
   return all;
 }
@@ -129,9 +130,8 @@ void JobWatch::note(const Late& late) {
   ++figures.jobs;
   ++figures.violations;
   figures.longest_ns = std::max(figures.longest_ns, response_ns);
-  auto known = std::ranges::find_if(violations_, [&](const BoundViolation& one) {
-    return one.job.component == figures.job.component;
-  });
+  auto known = std::ranges::find_if(
+      violations_, [&](const BoundViolation& one) { return one.job.component == figures.job.component; });
   if (known == violations_.end()) known = violations_.insert(known, BoundViolation{.job = figures.job});
   ++known->count;
   if (known->count > 1 && response_ns - figures.job.bound_ns <= known->excess_ns()) return;
@@ -152,8 +152,7 @@ void JobWatch::note(const Late& late) {
 /// Whole drains, the oldest first.
 void JobWatch::forget_before(time_ns_t time_ns) {
   const auto is_old = [&](const std::vector<TraceRecord>& records) {
-    return std::ranges::all_of(records,
-                               [&](const TraceRecord& record) { return record.time_ns < time_ns; });
+    return std::ranges::all_of(records, [&](const TraceRecord& record) { return record.time_ns < time_ns; });
   };
   const auto kept = std::find_if_not(history_.begin(), history_.end(), is_old);
   history_.erase(history_.begin(), kept);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Bounds are watched: each job above its bound is counted, and a change withdraws the bounds.
 #include "mauve_rt/deploy/job_watch.hpp"
-
 #include "mauve_rt/deploy/trace_collector.hpp"
+
 #include "simulated.hpp"
 
 namespace mauve::testing::test_job_watch {

@@ -13,8 +13,8 @@ namespace mauve {
 /// The bound of one kind of job: of all that a component executes from the end of one wait to the next wait.
 struct JobBound {
   std::string component;
-  std::string after;  // the wait that it follows; of the first job after a start the initial state
-  std::string until;  // the wait that it leads to
+  std::string after;      // the wait that it follows; of the first job after a start the initial state
+  std::string until;      // the wait that it leads to
   time_ns_t bound_ns{0};  // from the job's instant to its wait
 };
 
@@ -32,8 +32,10 @@ struct BoundViolation {
   time_ns_t instant_ns{0};
   time_ns_t response_ns{0};
   std::uint64_t count{0};
-  std::vector<TraceRecord> records{};  // of all components, from a while before the instant to the end of the job
+  std::vector<TraceRecord>
+      records{};  // of all components, from a while before the instant to the end of the job
 
+  /// [non-rt]
   time_ns_t excess_ns() const noexcept { return response_ns - job.bound_ns; }
 };
 
@@ -90,9 +92,10 @@ class JobWatch {
   time_ns_t since_ns_ MAUVE_GUARDED_BY(mutex_){0};
   time_ns_t longest_bound_ns_ MAUVE_GUARDED_BY(mutex_){0};
   std::vector<Followed> followed_ MAUVE_GUARDED_BY(mutex_);
-  std::vector<Current> current_ MAUVE_GUARDED_BY(mutex_);          // by number of the component
+  std::vector<Current> current_ MAUVE_GUARDED_BY(mutex_);                   // by number of the component
   std::vector<std::vector<TraceRecord>> history_ MAUVE_GUARDED_BY(mutex_);  // a drain each
-  std::vector<Late> late_ MAUVE_GUARDED_BY(mutex_);  // of the last drain: records of others may come with the next one
+  std::vector<Late> late_
+      MAUVE_GUARDED_BY(mutex_);  // of the last drain: records of others may come with the next one
   std::vector<BoundViolation> violations_ MAUVE_GUARDED_BY(mutex_);
 };
 
