@@ -10,6 +10,7 @@ from mauve_rt.file_schema.setting_words import range_of, sentence, unit_of
 
 _WORDS = {  # of kinds without bounds; a new kind needs a line
     "Flag": "boolean",
+    "_Requirement": "boolean, or the word `warn`",
     "Scalar": "boolean, number or text",
     "WhenPart": "[condition](#conditions)",
     "_TypeName": "[type](#types)",

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Self
 
 from mauve_rt.analysis.critical_section import CriticalSection
@@ -10,6 +11,7 @@ from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime, di
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 from mauve_rt.analysis.obstacles import obstacles
 from mauve_rt.analysis.offsets import Grid, times_with_offsets
+from mauve_rt.analysis.time_limit import check_time_limit
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,7 @@ def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, B
     times: dict[str, DigraphTimes] = {}
     levels: dict[str, list[Subject]] = {}
     for here in by_cpu(subjects):
-        found = digraph_times([component_of(subject, jitter_ns=wakeup_ns) for subject in here])
+        found = _times_of_cpu(tuple(here), wakeup_ns)
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
         levels |= {subject.name: here for subject in here}
     bounds: dict[str, Bound] = {}
@@ -109,16 +111,26 @@ def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, B
             continue
         bound = bound_of(subject, subjects, times)
         if bound.response_ns is not None and not bound.meets_deadline:
-            shorter = _with_offsets(subject, levels[subject.name], times[subject.name], wakeup_ns)
+            check_time_limit()
+            shorter = _with_offsets(subject, tuple(levels[subject.name]), wakeup_ns)
             if shorter != times[subject.name]:
                 bound = replace(bound_of(subject, subjects, {**times, subject.name: shorter}), by=OFFSETS)
         bounds[subject.name] = bound
     return bounds
 
 
-def _with_offsets(
-    subject: Subject, here: Sequence[Subject], without: DigraphTimes, wakeup_ns: int
-) -> DigraphTimes:
+_KEPT_CPUS = 64
+"""Results of the last ones: a change that touches one CPU leaves the bounds of the others."""
+
+
+@lru_cache(maxsize=_KEPT_CPUS)
+def _times_of_cpu(here: tuple[Subject, ...], wakeup_ns: int) -> Mapping[str, DigraphTimes]:
+    return digraph_times([component_of(subject, jitter_ns=wakeup_ns) for subject in here])
+
+
+@lru_cache(maxsize=_KEPT_CPUS)
+def _with_offsets(subject: Subject, here: tuple[Subject, ...], wakeup_ns: int) -> DigraphTimes:
+    without = _times_of_cpu(here, wakeup_ns)[subject.name]
     components = {each.name: component_of(each, jitter_ns=wakeup_ns) for each in here}
     limits_ns = {state.name: state.limit_ns for state in subject.machine.states}
     own = components[subject.name]

@@ -32,6 +32,7 @@ from mauve_rt.analysis.digraph_times import (
 )
 from mauve_rt.analysis.fixed_point import MOST_STEPS, UnboundedError
 from mauve_rt.analysis.machines import FOREVER_NS
+from mauve_rt.analysis.time_limit import check_time_limit
 
 _NOTHING = DigraphTask("", ())
 
@@ -100,6 +101,7 @@ def _times(
     loads: Mapping[str, tuple[Fraction, Fraction]],
     jitter_ns: int,
 ) -> DigraphTimes:
+    check_time_limit()
     own, components = merged[name], [*merged.values()]
     higher, equal = ([each.name for each in rank] for rank in level_of(own, components))
     blocked_ns = blocking_ns(own, components)

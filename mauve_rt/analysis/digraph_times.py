@@ -39,6 +39,7 @@ from mauve_rt.analysis.demand import Demand, Path, Staircase, cost_of, paths, ut
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.errors import AnalysisError
 from mauve_rt.analysis.fixed_point import UnboundedError, least_time_ns
+from mauve_rt.analysis.time_limit import check_time_limit
 
 _MOST_COMBINATIONS = 64
 
@@ -126,6 +127,7 @@ def _times(
     demands: Mapping[str, Demand],
     loads: Mapping[str, Fraction],
 ) -> DigraphTimes:
+    check_time_limit()
     higher, equal = level_of(one, components)
     level = (one, *higher, *equal)
     load = sum((loads[each.name] for each in level), start=Fraction(0))

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
-from mauve_rt.analysis.bounds import Bound, Subject, bound_of, by_cpu, component_of
+from mauve_rt.analysis.bounds import Bound, Subject, bound_of, by_cpu, component_of, delaying
 from mauve_rt.analysis.change import Member, Participant, times_during
 from mauve_rt.analysis.digraph import DigraphTask
 from mauve_rt.analysis.digraph_times import DigraphTimes
@@ -28,15 +28,27 @@ def bounds_during(
     after: Sequence[Subject],
     handovers: Handovers,
     *,
+    known: Mapping[str, Bound] | None = None,
     wakeup_ns: int = 0,
 ) -> dict[str, Bound]:
     """The bound of each of `subjects_during`, whenever the change comes.
 
+    `known`: bounds before the change; those on CPUs that it does not touch stay.
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
     """
     olds, news = _by_name(before), _by_name(after)
     times: dict[str, DigraphTimes] = {}
+    bounds: dict[str, Bound] = {}
     for here in by_cpu(subjects):
+        if known is not None and all(
+            one.name not in handovers and olds.get(one.name) == one == news.get(one.name) for one in here
+        ):
+            bounds |= {
+                one.name: known[one.name]
+                for one in here
+                if one.machine.is_component and not delaying(one, subjects)
+            }
+            continue
         members = [
             _member(
                 olds.get(subject.name),
@@ -48,11 +60,10 @@ def bounds_during(
         ]
         found = times_during(members)
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
-    return {
-        subject.name: bound_of(subject, subjects, times)
-        for subject in subjects
-        if subject.machine.is_component
-    }
+    for subject in subjects:
+        if subject.machine.is_component and subject.name not in bounds:
+            bounds[subject.name] = bound_of(subject, subjects, times)
+    return bounds
 
 
 def _by_name(subjects: Sequence[Subject]) -> dict[str, Subject]:

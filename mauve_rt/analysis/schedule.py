@@ -20,6 +20,7 @@ from typing import NamedTuple, Protocol
 
 from mauve_rt.analysis.digraph import DigraphTask, Job
 from mauve_rt.analysis.machines import FOREVER_NS, Machine
+from mauve_rt.analysis.time_limit import check_time_limit
 
 
 @dataclass(frozen=True)
@@ -181,6 +182,7 @@ class _Cpu:
     def run(self, most_jobs: int, *, until_repeated: bool) -> Schedule:
         idle: set[_Idle] = set()
         while len(self._cycles) < most_jobs:
+            check_time_limit()
             self._wake()
             if self._ready:
                 missed = self._execute(min(self._ready, key=lambda one: (-one.priority, one.place)))

@@ -11,7 +11,8 @@ from mauve_rt.analysis.obstacles import unknown_costs
 from mauve_rt.analysis.plan import Handovers, bounds_during, subjects_during
 from mauve_rt.analysis.refutation import Measured, contradictions
 from mauve_rt.analysis.threads import machines_of
-from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text
+from mauve_rt.analysis.time_limit import optional_part
+from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text, missing_of
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,14 @@ class Study:
     verdict: Verdict
     unknown: Sequence[str]
     """What is not known beside them, in words."""
+
+    @property
+    def missing(self) -> list[str]:
+        """What keeps it from being provable, each as `component: reason`; none where it is provable."""
+        if self.verdict.outcome is not Outcome.NOT_PROVABLE:
+            return []
+        subjects = [f"{one.name}: {why}" for one in missing_of(self.subjects) for why in one.obstacles]
+        return [*subjects, *(f"this computer: {why}" for why in self.unknown)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -82,7 +91,9 @@ def study_of_change(before: Study, after: Study, handovers: Handovers, surroundi
     """
     subjects = subjects_during(before.subjects, after.subjects, handovers)
     wakeup_ns = surroundings.wakeup_ns
-    bounds = bounds_during(subjects, before.subjects, after.subjects, handovers, wakeup_ns=wakeup_ns)
+    bounds = bounds_during(
+        subjects, before.subjects, after.subjects, handovers, known=before.bounds, wakeup_ns=wakeup_ns
+    )
     verdict = judge(subjects, bounds, unknown=before.unknown, measured=surroundings.measured, searches=False)
     joined = Study(subjects, bounds, verdict, before.unknown)
     if found := _run_during(before, after, joined, handovers, wakeup_ns):
@@ -100,7 +111,9 @@ def _run_during(
             continue
         old, new = ({one.name: one for one in side.subjects if one.name in names} for side in (before, after))
         times = {name: ns for name, ns in handovers.items() if name in names and ns is not None}
-        found = change_witness(old, new, times, wakeup_ns=wakeup_ns)
+        found = None
+        with optional_part():
+            found = change_witness(old, new, times, wakeup_ns=wakeup_ns)
         if found is not None and found[0].missed is not None:
             schedule, change_ns = found
             priorities = {one.name: one.machine.priority for one in cpu}

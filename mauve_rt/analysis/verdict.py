@@ -8,6 +8,7 @@ from enum import StrEnum
 from mauve_rt.analysis.bounds import Bound, Subject, by_cpu, delaying
 from mauve_rt.analysis.machines import in_ms
 from mauve_rt.analysis.schedule import Cycle, Schedule
+from mauve_rt.analysis.time_limit import optional_part
 from mauve_rt.analysis.witness import RUNS, member_of, witness_of
 
 
@@ -56,20 +57,23 @@ def judge(
     """
     components = [subject for subject in subjects if subject.machine.is_component]
     late = [subject for subject in components if not bounds[subject.name].meets_deadline]
-    for here in by_cpu(subjects) if searches else ():
-        if any(subject in late for subject in here):
-            members = [member_of(subject) for subject in here]
-            found = witness_of(members, wakeup_ns=wakeup_ns)
-            if found is not None and found.missed is not None:
-                priorities = {subject.name: subject.machine.priority for subject in here}
-                return Verdict(Outcome.NOT_SCHEDULABLE, miss_text(found, found.missed, priorities), found)
+    late_cpus = [here for here in by_cpu(subjects) if any(subject in late for subject in here)]
+    searched = 0
+    for here in late_cpus if searches else ():
+        found = None
+        with optional_part():
+            found = witness_of([member_of(subject) for subject in here], wakeup_ns=wakeup_ns)
+            searched += 1
+        if found is not None and found.missed is not None:
+            priorities = {subject.name: subject.machine.priority for subject in here}
+            return Verdict(Outcome.NOT_SCHEDULABLE, miss_text(found, found.missed, priorities), found)
     missing = [subject.name for subject in missing_of(subjects)]
     missing += ["this computer"] if unknown else []
     if missing:
         return Verdict(Outcome.NOT_PROVABLE, f"something is missing of {', '.join(missing)}")
     if late:
         reasons = "; ".join(_too_long(subject.name, bounds[subject.name]) for subject in late)
-        runs = f"; none of {RUNS} runs misses a deadline" if searches else ""
+        runs = f"; none of {RUNS} runs misses a deadline" if searched == len(late_cpus) else ""
         return Verdict(Outcome.NOT_PROVED, f"{reasons}{runs}")
     if contradictions:
         return Verdict(Outcome.REFUTED, "; ".join(contradictions))

@@ -1,15 +1,14 @@
 """`mauve analyze FILE --plan FILE`: the verdicts on a change, while it is made and after it."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-from mauve_rt._kernel import PluginRegistry
-from mauve_rt.analysis.machines import ExecutionTime, Machine, State
+from mauve_rt.analysis.machines import Machine
 from mauve_rt.analysis.plan import Handovers
-from mauve_rt.analysis.study import Study, Surroundings, study, study_of_change
+from mauve_rt.analysis.study import Study, Surroundings, study
 from mauve_rt.cli.analyzed import Analyzed, analyzed
+from mauve_rt.control.change_timing import budget_ns, handovers_of, judged_change, with_times_of_core
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.model import ArchitectureModel, PluginIndex
@@ -19,10 +18,7 @@ from mauve_rt.model.fragment import fragment
 from mauve_rt.model.steps import Change, Step, load_change
 from mauve_rt.model.threads import ThreadList, thread_list, uses_of
 from mauve_rt.supervision.rehearsal import before_and_after
-from mauve_rt.supervision.rules import RulesFile
-
-_NEW_CORE = ("replace_core", "replace_shell", "configure", "promote")
-"""Kinds of steps that put a new instance of the core in, which takes the state of the old one."""
+from mauve_rt.supervision.rules import Rule, RulesFile
 
 
 class Plan(NamedTuple):
@@ -54,6 +50,21 @@ class Planner:
         self._model, self._now = found.model, now
         self._components, self._surroundings = components, surroundings
 
+    @classmethod
+    def of_architecture(cls, path: Path) -> "Planner":
+        """Of an architecture file with the times that it declares."""
+        found = analyzed(str(path), ())
+        if found.threads is None:
+            raise ValueError("an architecture file has threads")
+        surroundings = Surroundings(threads=found.threads)
+        now = study(found.components, surroundings)
+        return cls(found, now, found.components, surroundings)
+
+    @property
+    def now(self) -> Study:
+        """What is known of the architecture."""
+        return self._now
+
     def of_file(self, path: Path) -> Iterator[Plan]:
         """The changes of a file: of steps, of each rule, or to another architecture.
 
@@ -66,9 +77,18 @@ class Planner:
             yield self._judged("", _by_file(path, self._model))
         elif kind is FileKind.RULES:
             for rule in RulesFile(path).rules.rules:
-                yield self._by_steps(f"when rule {rule.name} acts", path, Change(steps=list(rule.do)))
+                yield self.of_rule(path, rule)
         else:
             yield self._by_steps("", path, load_change(path))
+
+    def of_rule(self, path: Path, rule: Rule) -> Plan:
+        """The action of a rule of a file.
+
+        Raises:
+            ArchitectureFileError: the executor would refuse a step.
+
+        """
+        return self._by_steps(f"when rule {rule.name} acts", path, Change(steps=list(rule.do)))
 
     def alternatives(self) -> Iterator[Plan]:
         """Of each core that the file names as an alternative or a fallback.
@@ -90,11 +110,7 @@ class Planner:
         return self._judged(words, _by_steps(change, path, self._model, self._components))
 
     def _judged(self, words: str, after: "_After") -> Plan:
-        machines, threads, handovers = after
-        changed = replace(self._surroundings.threads, tasks=threads.tasks)
-        surroundings = replace(self._surroundings, threads=changed)
-        there = study(machines, surroundings)
-        return Plan(words, study_of_change(self._now, there, handovers, surroundings), there)
+        return Plan(words, *judged_change(self._now, self._surroundings, *after))
 
 
 _After = tuple[list[Machine], ThreadList, Handovers]
@@ -107,7 +123,7 @@ def _by_file(path: Path, before: ArchitectureModel) -> _After:
         raise ValueError("an architecture file has a model")
     cores = {name: part.core for name, part in after.model.components.items()}
     handovers = {
-        name: _budget_ns(after.registry, cores[name])
+        name: budget_ns(after.registry, cores[name])
         for name, part in before.components.items()
         if cores.get(name, part.core) != part.core
     }
@@ -116,55 +132,22 @@ def _by_file(path: Path, before: ArchitectureModel) -> _After:
 
 def _by_steps(change: Change, path: Path, model: ArchitectureModel, components: Sequence[Machine]) -> _After:
     before, after = before_and_after(path, change, model)
-    cores = {part.name: part.core for part in before.components}
+    registry = SimulatedRuntime.registry
+    there = {part.name for part in before.components}
     kinds = {resource.name: resource.kind for resource in after.resources}
     known = {machine.name: machine for machine in components}
     changed = {step.target for step in change.steps}
     index = PluginIndex.installed()
     machines: list[Machine] = []
-    handovers: dict[str, int | None] = {}
     for part in after.components:
         machine = Machine.of(part, is_python=is_python_part(part, index), kinds=kinds)
         if part.name in known and part.name not in changed:
             machine = known[part.name]
-        elif part.core != cores.get(part.name, part.core):
-            machine = _of_other_core(machine, part, model, cores[part.name])
+        elif part.name in there:
+            machine = with_times_of_core(machine, part, model.components[part.name], registry)
         machines.append(machine)
-        if part.name in cores and _has_new_core(part.name, change):
-            handovers[part.name] = _budget_ns(SimulatedRuntime.registry, part.core)
-    return machines, _threads_after(model, change, machines), handovers
-
-
-def _has_new_core(component: str, change: Change) -> bool:
-    return any(step.target == component and step.kind in _NEW_CORE for step in change.steps)
-
-
-def _budget_ns(registry: PluginRegistry, core: str) -> int | None:
-    """That a core declares for adopt and take together; None: it declares none."""
-    return registry.describe_core(core).budget_ns or None
-
-
-def _of_other_core(machine: Machine, part: Any, model: ArchitectureModel, before: str) -> Machine:
-    """Without the worst cases that the file declares: they are those of the core that was there before."""
-    declared = model.components[part.name].states if part.name in model.components else {}
-    times = SimulatedRuntime.registry.describe_core(part.core).wcet_ns
-    described = {state.name: state for state in part.states}
-    states = tuple(
-        replace(state, time=_own_time(state, described[state.name], times, part.core, before))
-        if state.name in declared and declared[state.name].wcet_ns is not None
-        else state
-        for state in machine.states
-    )
-    return replace(machine, states=states)
-
-
-def _own_time(
-    state: State, described: Any, times: Mapping[str, int], core: str, before: str
-) -> ExecutionTime:
-    methods = [*([] if state.is_wait else [described.action]), *described.guards]
-    if all(method in times for method in methods):
-        return ExecutionTime(sum(times[method] for method in methods), f"declared by core {core}")
-    return ExecutionTime(why_missing=f"the file declares the time of core {before}, not of {core}")
+    cores = {part.name: part.core for part in after.components if part.name in there}
+    return machines, _threads_after(model, change, machines), handovers_of(change.steps, cores, registry)
 
 
 def _threads_after(model: ArchitectureModel, change: Change, machines: Sequence[Machine]) -> ThreadList:

@@ -99,8 +99,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--plan",
         type=Path,
         metavar="STEPS|RULES|FILE",
-        help="judge a change of an architecture FILE, too, while it is made and after it: by steps, by what "
-        "rules do, or by the architecture file after it",
+        help="judge a change, too, while it is made and after it: by steps, by what rules do, or of an "
+        "architecture FILE by the file after it",
     )
     parser.add_argument(
         "--alternatives",
@@ -176,6 +176,10 @@ def _plans(
     """Of --plan and --alternatives."""
     if args.plan is None and not args.alternatives:
         return []
+    if found.model is None:
+        from mauve_rt.cli.analyze_node_plan import plans_of_node  # noqa: PLC0415
+
+        return [*plans_of_node(args.target, args.plan)]
     from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
 
     planner = Planner(found, now, components, surroundings)
@@ -240,10 +244,17 @@ def _wrong_arguments(args: argparse.Namespace) -> str:
         return f"--overhead-ns: expected 0 or more, found {args.overhead_ns}"
     if args.write and (args.budget_from is None or not Path(args.target).is_file()):
         return "--write: expected an architecture FILE and --budget-from BAG"
-    judges_changes = args.plan is not None or args.alternatives
-    if judges_changes and (args.model or is_bag(Path(args.target)) or not Path(args.target).is_file()):
-        option = "--plan" if args.plan is not None else "--alternatives"
-        return f"{option}: expected an architecture FILE whose parts are installed"
+    return _wrong_target(args)
+
+
+def _wrong_target(args: argparse.Namespace) -> str:
+    """Of --plan and --alternatives."""
+    is_file = Path(args.target).is_file() and not is_bag(Path(args.target)) and not args.model
+    is_node = args.target.startswith("/") and not Path(args.target).exists()
+    if args.alternatives and not is_file:
+        return "--alternatives: expected an architecture FILE whose parts are installed"
+    if args.plan is not None and not (is_file or is_node):
+        return "--plan: expected an architecture FILE whose parts are installed, or a NODE"
     return ""
 
 

@@ -1,13 +1,13 @@
 """A task model and a verdict to look at."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from mauve_rt.analysis.bounds import Bound, Subject
 from mauve_rt.analysis.digraph import Job
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, State, in_ms
 from mauve_rt.analysis.study import Study
-from mauve_rt.analysis.verdict import Outcome, missing_of
+from mauve_rt.analysis.verdict import Outcome
 from mauve_rt.model.threads import ThreadList
 
 if TYPE_CHECKING:
@@ -72,7 +72,7 @@ def print_verdict(now: Study, assumptions: Sequence[str]) -> None:
     elif verdict.outcome == Outcome.NOT_SCHEDULABLE:
         _print_list(f"{verdict.sentence}, if", _REACHED)
     elif verdict.outcome == Outcome.NOT_PROVABLE:
-        _print_list(verdict.sentence, [*_missing(now)])
+        _print_list(verdict.sentence, now.missing)
     else:
         print(verdict.sentence)
 
@@ -80,26 +80,22 @@ def print_verdict(now: Study, assumptions: Sequence[str]) -> None:
 def print_plan(plan: "Plan") -> None:
     """Print the verdicts on a change; of one with a name the worse one."""
     if plan.change:
-        is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
-        worse = plan.during if is_sound else plan.after
-        when = "while that is made: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
-        _print_study(f"{plan.change}: {when}", worse)
+        _print_list(*verdict_of_plan(plan))
     else:
         _print_study("during the change: ", plan.during)
         _print_study("after it: ", plan.after)
 
 
+def verdict_of_plan(plan: "Plan") -> tuple[str, list[str]]:
+    """Of a change with a name: the worse one of its verdicts, and what is missing."""
+    is_sound = plan.after.verdict.outcome == Outcome.SCHEDULABLE
+    worse = plan.during if is_sound else plan.after
+    when = "while that is made: " if is_sound and worse.verdict.outcome != Outcome.SCHEDULABLE else ""
+    return f"{plan.change}: {when}{worse.verdict.sentence}", worse.missing
+
+
 def _print_study(head: str, study: Study) -> None:
-    missing = [*_missing(study)] if study.verdict.outcome == Outcome.NOT_PROVABLE else []
-    _print_list(f"{head}{study.verdict.sentence}", missing)
-
-
-def _missing(study: Study) -> Iterator[str]:
-    for subject in missing_of(study.subjects):
-        for why in subject.obstacles:
-            yield f"{subject.name}: {why}"
-    for why in study.unknown:
-        yield f"this computer: {why}"
+    _print_list(f"{head}{study.verdict.sentence}", study.missing)
 
 
 _REACHED = (

@@ -14,7 +14,7 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError
 
 if TYPE_CHECKING:  # loaded by those who check only: the other verbs need not wait for it
-    from collections.abc import Iterable, Mapping, Sequence
+    from collections.abc import Iterable, Iterator, Mapping, Sequence
 
     from mauve_rt.errors import Problem
     from mauve_rt.file_schema.file_kind import FileKind
@@ -83,6 +83,8 @@ def _check_all(kinds: "Mapping[Path, FileKind]") -> int:
             status = _tell(error, printed)
     for subject in subjects if status == OK else ():
         _warn(subject.model.path, remarks(subject))
+        if subject.model.executor.require_schedulable and not models:
+            _warn(subject.model.path, _unschedulable(subject.model))
     return status
 
 
@@ -136,6 +138,18 @@ def _check_architecture(path: Path, models: "Sequence[PackageModel]", uses: "Use
         if parts.registry.sequences(resource.type):
             print(f"{path}: resource '{name}' takes {bytes_of_resource(resource, parts.registry):,} bytes")
     return subject
+
+
+def _unschedulable(model: "ArchitectureModel") -> "Iterator[Problem]":
+    """That each change will be refused, where the file itself is not schedulable."""
+    from mauve_rt.analysis.verdict import Outcome  # noqa: PLC0415
+    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
+
+    now = Planner.of_architecture(model.path).now
+    if now.verdict.outcome is not Outcome.SCHEDULABLE:
+        what = f"the executor requires schedulable changes, and this file is {now.verdict.sentence}"
+        remedy = f"mauve analyze {model.path} says what to declare"
+        yield model.key_problem(("executor", "require_schedulable"), what, remedy=remedy)
 
 
 def _check_steps(path: Path, model: "ArchitectureModel | None", uses: "Uses") -> None:

@@ -67,6 +67,8 @@ def _check(args: argparse.Namespace) -> int:
             periods = executor.periods_s()
             warnings += model_warnings(file, model, executor)
     _print_bounds(file, periods)
+    if model is not None and not found:
+        _print_verdicts(args.architecture, file)
     for problem in sorted(found, key=lambda each: (each.line, each.column)):
         _complain(file, problem)
     for warning in warnings:
@@ -94,6 +96,19 @@ def _print_bounds(file: "RulesFile", periods: Mapping[str, float]) -> None:
         _print_bound(f"{named}: at most from the cause to the first release", bound)
         if (reserve := reserve_bound_of(rule, periods)) is not None:
             _print_bound(f"{named}: otherwise at most from the cause to safe outputs", reserve)
+
+
+def _print_verdicts(architecture: Path, file: "RulesFile") -> None:
+    """What the timing analysis says of each rule's action; `mauve analyze` has the reasons."""
+    from mauve_rt.cli.analyze_plan import Planner  # noqa: PLC0415
+    from mauve_rt.cli.analyze_view import verdict_of_plan  # noqa: PLC0415
+
+    planner = Planner.of_architecture(architecture)
+    for rule in file.rules.rules:
+        try:
+            print(verdict_of_plan(planner.of_rule(file.path, rule))[0])
+        except ArchitectureFileError as error:  # a new core may refuse the old one's state that early
+            print(f"when rule {rule.name} acts: not proved: {error.problems[0].text()}")
 
 
 def _print_bound(what: str, bound: "Bound") -> None:

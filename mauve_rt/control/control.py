@@ -17,6 +17,7 @@ from mauve_rt._kernel import (
     monotonic_ns,
 )
 from mauve_rt.control.checks import check_form, check_revision, check_state, check_time
+from mauve_rt.control.judging import Judge, Judged
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.probations import Verdict
 from mauve_rt.control.reloads import Reload
@@ -103,16 +104,18 @@ class Control:
         outside: Outside | None = None,
         recordings: Recordings | None = None,
         limits: RequestLimits | None = None,
+        judge: Judge | None = None,
     ) -> None:
         """The report of a commit is pending up to `phase_timeout_s`, until the next release tells its phase.
 
         Without an `outside`, a request that binds a resource to a topic or service is refused; without
-        `recordings`, one that records.
+        `recordings`, one that records. Without a `judge`, no change is judged by its timing.
         """
         self._runtime = runtime
         self._outside = outside
         self._recordings = recordings
         self._limits = limits or RequestLimits()
+        self._judge = judge
         self._taken: dict[str, int] = {}  # bytes, by name of what requests added and nobody removed
         self._phase_timeout_ns = round(phase_timeout_s * 1e9)
         self._log = RequestLog()
@@ -251,7 +254,7 @@ class Control:
                 with self._own_count(request):
                     outcome = self._carry_out(request, parts, expected_revision=expected_revision)
         except RefusalError as refusal:
-            outcome = Outcome(code=refusal.code, message=str(refusal))
+            outcome = Outcome(code=refusal.code, message=str(refusal), timing=refusal.timing)
         except MauveError as error:
             outcome = Outcome(code=code_of(error), message=one_line(str(error)))
         except BaseException as error:  # noqa: BLE001 - whatever it is, it must not cost the requester the answer
@@ -282,14 +285,28 @@ class Control:
                     check_state(step, part)
             if not request.dry_run:
                 return self._start_or_stop(step, request, expected_revision=expected_revision)
+        judged = self._judged(request, request.steps)
         with self._bound(plan.bound, dry_run=request.dry_run):
             committed = self._commit(plan.transaction, request, expected_revision=expected_revision)
         if request.dry_run:
+            judged.require()
             words = "; ".join(str(step) for step in request.steps)
-            return Outcome(code=Code.OK, message=f"dry run: '{words}' would be accepted")
+            told = "; ".join([f"dry run: '{words}' would be accepted", *judged.words()])
+            return Outcome(code=Code.OK, message=told, timing=judged.verdicts)
         self._runtime.declare(added=plan.added, removed=plan.removed)
         self._taken = plan.taken
-        return self._followed(Outcome(code=Code.OK, message=""), committed, request.steps)
+        return _warned(self._followed(Outcome(code=Code.OK, message=""), committed, request.steps), judged)
+
+    def _judged(self, request: Request, steps: Sequence[Step]) -> Judged:
+        """The verdicts on the timing of a change, before its commit.
+
+        Raises:
+            RefusalError: NOT_SCHEDULABLE; of a dry run the caller asks `require`.
+        """
+        judged = Judged() if self._judge is None else self._judge.of_request(request, steps)
+        if not request.dry_run:
+            judged.require()
+        return judged
 
     def _reload(
         self,
@@ -310,6 +327,7 @@ class Control:
         before: dict[str, tuple[int, int]] = {}
         try:
             steps, transaction = reload.steps()
+            judged = self._judged(request, steps)
             before = {step.target: self._trials.get(step.target, _NO_TRIAL) for step in steps}
             # Before the commit: its verdict may come, and be looked at, before the commit returns.
             self._trials.update(dict.fromkeys(before, trial))
@@ -324,7 +342,9 @@ class Control:
         outcome = Outcome(
             code=Code.OK, message=reload.message(steps), loaded=reload.generation.loaded, report=()
         )
-        return outcome if committed is None else self._followed(outcome, committed, tuple(steps))
+        if committed is not None:
+            outcome = self._followed(outcome, committed, tuple(steps))
+        return _warned(outcome, judged)
 
     def _followed(self, outcome: Outcome, committed: Committed, steps: tuple[Step, ...]) -> Outcome:
         """The outcome with the report of its change, which may lack the releases that follow."""
@@ -428,6 +448,14 @@ _NOTHING_NOW = {
     True: "nothing is to be done: it is so, or a rule of higher rank sets it",
     False: "it is in force once the rules that set it have ended",
 }
+
+
+def _warned(outcome: Outcome, judged: Judged) -> Outcome:
+    """With what is known of its timing; of an executor that only warns."""
+    if not judged.objection:
+        return replace(outcome, timing=judged.verdicts)
+    message = f"{outcome.message}; warning: {judged.objection}"
+    return replace(outcome, message=message, timing=judged.verdicts)
 
 
 def _words_of(elements: Sequence[tuple[str, str]]) -> str:

@@ -24,6 +24,7 @@ __all__ = [
     "Request",
     "RequestLog",
     "Step",
+    "TimingVerdict",
     "code_name",
     "code_of",
     "reused_id",
@@ -56,9 +57,9 @@ def code_name(code: int) -> str:
 class RefusalError(Exception):
     """A request that is not carried out, and why."""
 
-    def __init__(self, code: Code, message: str) -> None:
+    def __init__(self, code: Code, message: str, timing: "tuple[TimingVerdict, ...]" = ()) -> None:
         super().__init__(message)
-        self.code = code
+        self.code, self.timing = code, timing
 
 
 BY_RELOAD = "reload by "  # how the author begins of a reload's changes
@@ -179,6 +180,16 @@ class Report:
 
 
 @dataclass(frozen=True, kw_only=True)
+class TimingVerdict:
+    """What the timing analysis says before, during or after a change, as mauve_msgs/msg/TimingVerdict."""
+
+    outcome: str
+    sentence: str
+    missing: tuple[str, ...] = ()
+    witness: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
     """What came of a request."""
 
@@ -190,6 +201,7 @@ class Outcome:
     to_core: str = ""
     bag: str = ""  # of an order to the recording
     loaded: tuple[str, ...] = ()  # of a reload: libraries and modules
+    timing: tuple[TimingVerdict, ...] = ()  # before, during and after a change, where that is judged
     pending: "Pending | None" = field(default=None, compare=False, repr=False)  # what its report lacks still
     replayed: bool = field(default=False, compare=False)  # the first outcome of a repeated request_id
 

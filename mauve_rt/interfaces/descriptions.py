@@ -20,6 +20,7 @@ from mauve_msgs.msg import (
     StepReport,
     TaskInfo,
     TaskList,
+    TimingVerdict,
     TraceArchitecture,
 )
 from mauve_msgs.msg import HeldElement as HeldElementMessage
@@ -185,7 +186,8 @@ def task_list(
     others: Iterable[ThreadInfo] = (),
 ) -> Any:
     """TaskList; `uses` and `others`: as for `threads_of`."""
-    known = threads_of(runtime, components, uses, others=others)
+    has_bounds = any(state.max_execution_ns for part in components for state in part.states)
+    known = threads_of(runtime, components, uses, has_bounds=has_bounds, others=others)
     return TaskList(
         wakeup_ns=known.wakeup_ns,
         overhead_ns=known.overhead_ns,
@@ -315,6 +317,11 @@ def step_reports(outcome: Outcome) -> list[Any]:
     """StepReport of every step."""
     lists = [(report, {"taken": list(report.taken), "left": list(report.left)}) for report in outcome.report]
     return [StepReport(**{**vars(report), **of_state}) for report, of_state in lists]
+
+
+def timing_verdicts(outcome: Outcome) -> list[Any]:
+    """TimingVerdict of each verdict."""
+    return [TimingVerdict(**{**vars(verdict), "missing": [*verdict.missing]}) for verdict in outcome.timing]
 
 
 def reconfiguration_event(request: Request, outcome: Outcome, *, stamp: Any, instance_id: str) -> Any:

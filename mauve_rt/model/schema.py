@@ -99,6 +99,19 @@ class _Alternatives(ListOf):
         return {"anyOf": [super().json_schema(definitions), {"const": "installed"}]}
 
 
+class _Requirement(Flag):
+    """True, false, or the word `warn`."""
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        if not isinstance(value, bool) and value != "warn":
+            faults.append(Fault(place, "form", limit="true, false or the word warn", found=value))
+        return value
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return {"anyOf": [super().json_schema(definitions), {"const": "warn"}]}
+
+
 class ThresholdModel(Section):
     """From which figure on a status is a warning, and from which an error."""
 
@@ -221,6 +234,12 @@ class ExecutorModel(Section):
         Whole(0, _LONGEST_NS),
         "cost of a release of a component beside its states on this computer, for the timing analysis",
         default=None,
+    )
+    require_schedulable: bool | str = setting(
+        _Requirement(),
+        "refuse a change, and rules, that the timing analysis does not prove schedulable; warn: make the "
+        "change, and warn",
+        default=False,
     )
     sentinel: bool = setting(
         Flag(),

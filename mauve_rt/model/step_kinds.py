@@ -25,6 +25,7 @@ class StepKind:
     removes: bool = False  # its target
     needs_running: bool = False  # a rule with such a step waits until its component runs
     changes_parameters: bool = False  # those of the executor's node
+    protects: bool = False  # it is never refused for its timing: it asks for less, or goes back
     is_prepared: bool = True  # an executor can make it ready for a rule of its own, so that it only commits
 
     @property
@@ -58,7 +59,8 @@ STEP_KINDS: Mapping[str, StepKind] = {
         needs_running=True,
     ),
     "revert_core": StepKind(
-        what="put the old core of a core on probation back; without a probation nothing happens"
+        what="put the old core of a core on probation back; without a probation nothing happens",
+        protects=True,
     ),
     "shadow": StepKind(
         what="execute a candidate core in parallel with the core, on the same inputs and without effects",
@@ -66,7 +68,7 @@ STEP_KINDS: Mapping[str, StepKind] = {
         value="shadow",
         is_prepared=False,
     ),
-    "end_shadow": StepKind(what="end the shadow of the component", is_prepared=False),
+    "end_shadow": StepKind(what="end the shadow of the component", is_prepared=False, protects=True),
     "promote": StepKind(
         what="replace the core by the candidate of the shadow, which keeps its state", is_prepared=False
     ),
@@ -95,16 +97,18 @@ STEP_KINDS: Mapping[str, StepKind] = {
         changes_parameters=True,
         is_prepared=False,
     ),
-    "remove_component": StepKind(what="stop and remove the component", removes=True, changes_parameters=True),
+    "remove_component": StepKind(
+        what="stop and remove the component", removes=True, changes_parameters=True, protects=True
+    ),
     "add_resource": StepKind(
         what="add a resource; value: its section of an architecture file",
         target="new resource",
         value="section",
         is_prepared=False,
     ),
-    "remove_resource": StepKind(what="remove the resource", target="resource", removes=True),
+    "remove_resource": StepKind(what="remove the resource", target="resource", removes=True, protects=True),
     "start": StepKind(what="start the component at its next instant", leaves=("RUNNING",)),
-    "stop": StepKind(what="stop the component", leaves=("STOPPED",)),
+    "stop": StepKind(what="stop the component", leaves=("STOPPED",), protects=True),
     "configure": StepKind(
         what="configure the component again, for example after a fault",
         leaves=("STOPPED", "RUNNING"),

@@ -105,7 +105,7 @@ def try_change(path: Path, change: Change, model: ArchitectureModel) -> None:
     Raises:
         ArchitectureFileError: at the step that it would refuse.
     """
-    with rehearsal(model) as executor, _refusals_at(path):
+    with rehearsal(model) as executor, refusals_at(path):
         executor.carry_out(change.steps, dry_run=True)
 
 
@@ -115,14 +115,19 @@ def before_and_after(path: Path, change: Change, model: ArchitectureModel) -> tu
     Raises:
         ArchitectureFileError: at the step that the executor would refuse.
     """
-    with rehearsal(model) as executor, _refusals_at(path):
+    with rehearsal(model) as executor, refusals_at(path):
         before = executor.described()
         executor.carry_out(change.steps)
         return before, executor.described()
 
 
 @contextmanager
-def _refusals_at(path: Path) -> Iterator[None]:
+def refusals_at(path: Path) -> Iterator[None]:
+    """Give a refused step its place in a file of steps.
+
+    Raises:
+        ArchitectureFileError: at that step.
+    """
     try:
         yield
     except RefusedStepError as error:

@@ -14,12 +14,14 @@ from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackRet
 
 from mauve_rt._bridge import NodeWatch
 from mauve_rt._kernel import STOP_TIMEOUT_NS, process_ends
+from mauve_rt.control.judging import Judge
 from mauve_rt.control.limits import RequestLimits
 from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.values import Values
 from mauve_rt.counts import counted
 from mauve_rt.errors import MauveError, exception_text, one_line
+from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.bounds import WatchedBounds
 from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
@@ -93,9 +95,11 @@ class ExecutorNode(LifecycleNode):
         self._recording = Recording(self, runtime, self._bound, data_group=MutuallyExclusiveCallbackGroup())
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._properties = Parameters(self, runtime)
+        self._judge = Judge(runtime, uses=self._bound.bindings, others=real_time_threads)
         self._rules = OwnRules(
             self,
             runtime,
+            judge=self._judge,
             topics=self._bound.heard,
             listen=self._bound.listen_for_silence,
             publish=self._state.send,
@@ -146,6 +150,7 @@ class ExecutorNode(LifecycleNode):
             outside=self._bound,
             recordings=RecordingOrders(self._recording, self._runtime, folder=Path(self._settings["bags"])),
             limits=_limits(self._settings),
+            judge=self._judge,
         )
         self._state.completed = control.complete
         services = Services(

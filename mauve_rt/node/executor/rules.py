@@ -10,6 +10,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from mauve_msgs.msg import SupervisorDecision
 from mauve_rt._kernel import KEPT, Overlay, RuleFacts, RuleRunner, ToldDecision, monotonic_ns
+from mauve_rt.control.judging import Judge, NotSchedulableError
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError, MauveError, ParameterError
@@ -52,6 +53,7 @@ class OwnRules:
         node: LifecycleNode,
         runtime: Runtime,
         *,
+        judge: Judge,
         topics: Callable[[], dict[str, str]],
         listen: Callable[[set[str], set[str]], None],
         publish: Callable[[Any, str, Any, QoSProfile], None],
@@ -60,7 +62,9 @@ class OwnRules:
         watch: Watch,
         folder: Path,
     ) -> None:
-        """`topics`: those that resources are bound to; `publish` sends and records a message.
+        """`judge` says which actions are schedulable.
+
+        `topics`: those that resources are bound to; `publish` sends and records a message.
 
         `listen` takes the resources whose silence rules wait for, and those whose link's.
 
@@ -70,6 +74,7 @@ class OwnRules:
         """
         self._node = node
         self._runtime = runtime
+        self._judge = judge
         self._topics = topics
         self._listen = listen
         self._publish = publish
@@ -161,7 +166,10 @@ class OwnRules:
 
         # Of rules at work the runner's own error tells of the first trouble, without the place.
         topics = self._topics_of if self._runner is None else None
-        return LoadedRules.read(path, self._runtime, topics=topics)
+        loaded = LoadedRules.read(path, self._runtime, topics=topics)
+        for warning in loaded.unschedulable(self._judge):
+            self._node.get_logger().warning(warning)
+        return loaded
 
     def _topics_of(self, rules: Sequence["Rule"]) -> dict[str, str]:
         """The resource that is bound to each topic, named as in the rules."""
@@ -348,6 +356,8 @@ def load_reply(rules: OwnRules, path: str, release: Sequence[str] = ()) -> tuple
         count = rules.load(path, release)
     except ActiveSafetyRuleError as error:
         return Code.ACTIVE_SAFETY_RULE, str(error)
+    except NotSchedulableError as error:
+        return Code.NOT_SCHEDULABLE, str(error)
     except ArchitectureFileError as error:
         return Code.INVALID, str(error) if _may_be_shown(error.file) else _without_content(error)
     except ParameterError as error:

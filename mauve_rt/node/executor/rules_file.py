@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from mauve_rt._kernel import Host, RuleActions, RuleFacts, RuleRunner, monotonic_ns
+from mauve_rt.control.judging import Judge, NotSchedulableError, protects
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.told_decisions import DecisionMessages, rule_info
@@ -42,6 +43,28 @@ class LoadedRules:
         if found_unobservable:
             raise ArchitectureFileError(file.path, found_unobservable)
         return cls(path, rules, rule_actions(file, runtime))
+
+    def unschedulable(self, judge: Judge) -> list[str]:
+        """The actions that are not schedulable, in words, where the executor only warns of them.
+
+        Raises:
+            NotSchedulableError: at these actions, where the executor requires that they are.
+        """
+        if not judge.requirement:
+            return []
+        file = RulesFile(self.path, waits=False)
+        found = []
+        for index, rule in enumerate(file.rules.rules):
+            if rule.where == "executor" and not protects(rule.do):
+                objection = judge.of_steps(rule.do, always=False).objection
+                if objection:
+                    place = ("rules", index, "do")
+                    found.append(
+                        file.problem(place, f"rule {rule.name}: its action is not proved: {objection}")
+                    )
+        if found and judge.requirement is True:
+            raise NotSchedulableError(self.path, found)
+        return [f"{self.path}:{each.line}:{each.column}: {each.text()}" for each in found]
 
     def runner(self, host: Host, topics: Mapping[str, str], before: RuleRunner | None) -> RuleRunner:
         """What runs them, not started yet; `before`: whose place it takes."""

@@ -42,6 +42,7 @@ from mauve_rt.interfaces.descriptions import (
     resource_infos,
     step_reports,
     task_list,
+    timing_verdicts,
 )
 from mauve_rt.interfaces.values import value_message
 from mauve_rt.model.schema import DEFAULT_MIRROR_HZ
@@ -324,6 +325,8 @@ class Services:
             response.report = step_reports(outcome)
             if hasattr(response, "bag"):
                 response.bag = outcome.bag
+            if hasattr(response, "timing"):
+                response.timing = timing_verdicts(outcome)
             if hasattr(response, "loaded"):
                 response.loaded = list(outcome.loaded)
             return response

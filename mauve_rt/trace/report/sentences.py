@@ -57,8 +57,11 @@ def _violations(analysis: Analysis) -> Iterator[Sentence]:
     worst: dict[str, Violation] = {}
     for one in sorted(analysis.violations, key=lambda one: -one.excess_ns):
         worst.setdefault(one.component, one)
+    if worst:
+        jobs = counted(sum(one.jobs for one in analysis.violations), "job")
+        yield Sentence(ATTENTION, f"{jobs} took longer than proved: correct the declared times, or the model.")
     for one in [*worst.values()][:_NAMED]:
-        yield Sentence(BAD, f"At {time_text(one.end_ns - analysis.zero_ns)}: {one.message}.")
+        yield Sentence(ATTENTION, f"At {time_text(one.end_ns - analysis.zero_ns)}: {one.message}.")
 
 
 def _scope(analysis: Analysis) -> Iterator[Sentence]:

@@ -93,8 +93,6 @@ def _wrong(analysis: Analysis, machine: Machine) -> Iterator[str]:
         yield counted(len(analysis.faults), "fault")
     if analysis.misses:
         yield counted(len(analysis.misses), "missed deadline")
-    if analysis.violations:
-        yield counted(sum(one.jobs for one in analysis.violations), "job") + " above a proved bound"
     if overruns:
         releases = counted(sum(one.releases for one in found), "release")
         least = "at least " if analysis.trace.lost else ""

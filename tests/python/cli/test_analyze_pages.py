@@ -41,4 +41,4 @@ def test_the_pieces_of_files_are_accepted(tmp_path: Path) -> None:
             parts = piece.replace("...", "shell: a/A, core: a/A, fsm: a/A")
             file.write_text(f"mauve: 1\ncomponents:\n  {parts}", encoding="utf-8")
         assert [*load_architecture(file).components] == ["control"]
-    assert len(pieces) == 3
+    assert len(pieces) == 4

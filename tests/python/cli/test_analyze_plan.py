@@ -120,10 +120,12 @@ def test_what_the_executor_would_refuse_is_refused(plan: Plan) -> None:
     assert err.startswith("mauve: change.yaml:1:3: core 'executor_tests/None' is not installed")
 
 
-def test_a_plan_is_for_a_file(plan: Plan, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["analyze", "/robot_1/executor", "--plan", "change.yaml"]) == 2
-    why = "mauve: --plan: expected an architecture FILE whose parts are installed\n"
-    assert capsys.readouterr().err == why
+def test_a_plan_is_for_a_file_or_a_node(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["analyze", str(tmp_path), "--plan", "change.yaml"]) == 2
+    why = "expected an architecture FILE whose parts are installed"
+    assert capsys.readouterr().err == f"mauve: --plan: {why}, or a NODE\n"
+    assert main(["analyze", "/robot_1/executor", "--alternatives"]) == 2
+    assert capsys.readouterr().err == f"mauve: --alternatives: {why}\n"
 
 
 def test_alternatives_and_fallbacks_have_verdicts_of_their_own(plan: Plan) -> None:

@@ -43,6 +43,15 @@ STEPS = """\
 """
 
 
+REQUIRED = """\
+mauve: 1
+executor: {wakeup_us: 100, overhead_ns: 20000, require_schedulable: true}
+components:
+  one: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+        priority: 40, cpus: [0], states: {Count: {wcet_ns: 1000}}}
+"""
+
+
 @pytest.fixture
 def check(tmp_path: Path, plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> Check:
     """check(NAME=TEXT, ...): status, lines of stdout and of stderr, the folder's name taken out of them."""
@@ -200,3 +209,19 @@ def test_of_several_files_each_is_told(check: Check) -> None:
     assert status == 2
     assert out == ["steps: 3 steps: no error found"]  # by itself, as there is nothing to try it on
     assert {line.split(":")[0] for line in errors} == {"robot", "rules"}
+
+
+def test_a_file_that_requires_what_it_does_not_have_is_warned_of(check: Check) -> None:
+    status, out, errors = check(robot=REQUIRED)
+    assert (status, len(out), errors) == (0, 1, []), "it is schedulable"
+    status, out, errors = check(robot=REQUIRED.replace("wakeup_us: 100, ", ""))
+    assert (status, len(out)) == (0, 1)
+    [warning] = errors
+    assert warning.startswith(
+        "robot:2:32: warning: the executor requires schedulable changes, and this file is not provable: "
+        "something is missing of this computer"
+    )
+    assert warning.endswith("robot says what to declare")
+    [error] = check(robot=REQUIRED.replace("true", "maybe"))[2]
+    assert "require_schedulable" in error
+    assert "expected true, false or the word warn, found 'maybe'" in error

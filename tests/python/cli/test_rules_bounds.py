@@ -15,7 +15,7 @@ BACK = "    undo: {for_s: 1.0}\n"
 
 
 def parts(out: list[str]) -> dict[str, float]:
-    return {what: float(ms) for ms, what in (line.split(" ms  ") for line in out[1:-1])}
+    return {what: float(ms) for ms, what in (line.split(" ms  ") for line in out if line[0] == " ")}
 
 
 def loaded(folder: Path, when: str, do: str = SWAP, more: str = "", name: str = "one") -> Rule:
@@ -37,6 +37,15 @@ def test_in_the_executor(check: Check) -> None:
         "one period of one": 10.0,
     }
     assert out[0] == "quiet (in the executor): at most from the cause to the first release: 1261.000 ms"
+
+
+def test_the_timing_of_each_action_is_judged(check: Check) -> None:
+    _, out, _ = check(rule(), robot=ROBOT)
+    assert [line for line in out if line.startswith("when rule")] == [
+        "when rule quiet acts: not provable: something is missing of one, this computer"
+    ]
+    _, out, _ = check(rule())
+    assert not any(line.startswith("when rule") for line in out)
 
 
 def test_in_the_supervisor(check: Check) -> None:

@@ -47,7 +47,8 @@ def test_each_has_a_marker_a_place_and_a_sentence(trace: Trace, tmp_path: Path) 
     page = tmp_path / "page.html"
     write_report(page, trace, title="t")
     text = page.read_text("utf-8")
-    assert "3 jobs above a proved bound" in text
+    assert "3 jobs took longer than proved" in text
+    assert "no overrun, no fault" in text, "a deadline is another thing"
     assert "a job took too long" in text
     assert 'data-jump="violation"' in text
 

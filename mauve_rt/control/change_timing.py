@@ -1,0 +1,79 @@
+"""A change by steps as the timing analysis takes it: handovers, execution times of other cores, verdicts.
+
+Import this module only to judge: it loads the analysis.
+"""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+from mauve_rt._kernel import PluginRegistry
+from mauve_rt.analysis.machines import ExecutionTime, Machine, State
+from mauve_rt.analysis.plan import Handovers
+from mauve_rt.analysis.study import Study, Surroundings, study, study_of_change
+from mauve_rt.model.schema import ComponentModel
+from mauve_rt.model.steps import Step
+from mauve_rt.model.threads import ThreadList
+
+_NEW_CORE = ("replace_core", "replace_shell", "configure", "promote", "revert_core")
+"""Kinds of steps that put another instance of the core in, which takes the state of the old one."""
+
+
+class JudgedChange(NamedTuple):
+    """What is known of a change, while it is made and after it."""
+
+    during: Study
+    after: Study
+
+
+def judged_change(
+    now: Study,
+    surroundings: Surroundings,
+    machines: list[Machine],
+    threads: ThreadList,
+    handovers: Handovers,
+) -> JudgedChange:
+    """The studies of a change to these components and threads."""
+    changed = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
+    after = study(machines, changed)
+    return JudgedChange(study_of_change(now, after, handovers, changed), after)
+
+
+def handovers_of(steps: Iterable[Step], cores: Mapping[str, str], registry: PluginRegistry) -> Handovers:
+    """Of the components that get another core; `cores`: after the change, of those that were there before."""
+    found = {step.target for step in steps if step.kind in _NEW_CORE}
+    return {name: budget_ns(registry, core) for name, core in cores.items() if name in found}
+
+
+def budget_ns(registry: PluginRegistry, core: str) -> int | None:
+    """That a core declares for adopt and take together; None: it declares none."""
+    return registry.describe_core(core).budget_ns or None
+
+
+def with_times_of_core(
+    machine: Machine, part: Any, declared: ComponentModel | None, registry: PluginRegistry
+) -> Machine:
+    """Without the worst cases that the file declares, where these are those of another core.
+
+    `part`: the component with the core that it has; `declared`: as the file describes it.
+    """
+    if declared is None or declared.core == part.core:
+        return machine
+    times = registry.describe_core(part.core).wcet_ns
+    described = {state.name: state for state in part.states}
+    states = tuple(
+        replace(state, time=_own_time(state, described[state.name], times, part.core, declared.core))
+        if state.name in declared.states and declared.states[state.name].wcet_ns is not None
+        else state
+        for state in machine.states
+    )
+    return replace(machine, states=states)
+
+
+def _own_time(
+    state: State, described: Any, times: Mapping[str, int], core: str, declared: str
+) -> ExecutionTime:
+    methods = [*([] if state.is_wait else [described.action]), *described.guards]
+    if all(method in times for method in methods):
+        return ExecutionTime(sum(times[method] for method in methods), f"declared by core {core}")
+    return ExecutionTime(why_missing=f"the file declares the time of core {declared}, not of {core}")
