@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mauve_rt.control.bound_watch import BoundWatch, Violation, WatchedBound
 
 _PERIOD_S = 1.0
+_END_S = 2.0
 _DEPTH = 100
 TYPE = "mauve_msgs/msg/BoundViolation"
 
@@ -64,7 +65,7 @@ class WatchedBounds:
         """End the watch; no violation is left behind. May be called again."""
         self._ending.set()
         if self._thread is not None:
-            self._thread.join()
+            self._thread.join(_END_S)  # it may be computing bounds, for no use now
             self._thread = None
         watched, self._watched = self._watched, None
         if watched is not None:
