@@ -59,7 +59,9 @@ def _violations(analysis: Analysis) -> Iterator[Sentence]:
         worst.setdefault(one.component, one)
     if worst:
         jobs = counted(sum(one.jobs for one in analysis.violations), "job")
-        yield Sentence(ATTENTION, f"{jobs} took longer than proved: correct the declared times, or the model.")
+        yield Sentence(
+            ATTENTION, f"{jobs} took longer than proved: correct the declared times, or the model."
+        )
     for one in [*worst.values()][:_NAMED]:
         yield Sentence(ATTENTION, f"At {time_text(one.end_ns - analysis.zero_ns)}: {one.message}.")
 
