@@ -6,7 +6,7 @@ from functools import lru_cache
 from typing import Self
 
 from mauve_rt.analysis.critical_section import CriticalSection
-from mauve_rt.analysis.digraph import DigraphTask, digraph_of, period_of
+from mauve_rt.analysis.digraph import START, DigraphTask, digraph_of, period_of
 from mauve_rt.analysis.digraph_times import Component, DigraphTimes, JobTime, digraph_times
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, in_ms
 from mauve_rt.analysis.obstacles import obstacles
@@ -83,6 +83,15 @@ class Bound:
         """Whether each job comes to its wait in time and no state is cut off, if the assumptions hold."""
         in_time = self.response_ns is not None and self.response_ns <= self.deadline_ns
         return in_time and not self.too_long
+
+
+def jobs_by_waits(machine: Machine, bound: Bound) -> dict[tuple[str, str], JobTime]:
+    """The jobs of a bound by the names that a trace has: of the wait before a job and of the wait after it.
+
+    The first job after a start follows no wait: a trace names the initial state.
+    """
+    initial = next((state.name for state in machine.states if state.is_initial), "")
+    return {(initial if one.job.after == START else one.job.after, one.job.until): one for one in bound.jobs}
 
 
 def bounds_of(subjects: Sequence[Subject], *, wakeup_ns: int = 0) -> dict[str, Bound]:

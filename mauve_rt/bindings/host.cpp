@@ -201,17 +201,74 @@ ReadMessage PyHost::read_resource(const std::string& name) {
 
 void PyHost::collect_trace(time_ns_t period_ns) {
   const std::lock_guard lock(collector_mutex_);
+  keep_period_ns_ = period_ns;
+  renew_collector();
+}
+
+void PyHost::renew_collector() {
+  constexpr time_ns_t kWatchPeriod = ms_to_ns(20);
   collector_.reset();
-  if (period_ns > 0 && !host().is_simulated())
-    collector_ = std::make_unique<TraceCollector>(architecture_, period_ns);
+  const bool keeps = keep_period_ns_ > 0;
+  if ((keeps || is_watched_) && !host().is_simulated()) {
+    collector_ = std::make_unique<TraceCollector>(architecture_, keeps ? keep_period_ns_ : kWatchPeriod,
+                                                  &watch_, keeps);
+  }
+}
+
+bool PyHost::watch_jobs(const std::vector<JobBound>& bounds, std::uint64_t revision) {
+  if (!watch_.watch(bounds, revision, host().now_ns())) return false;
+  const std::lock_guard lock(collector_mutex_);
+  is_watched_ = true;
+  if (collector_ == nullptr) renew_collector();
+  return true;
+}
+
+void PyHost::end_job_watch() {
+  const std::lock_guard lock(collector_mutex_);
+  watch_.end();
+  is_watched_ = false;
+  if (keep_period_ns_ <= 0) collector_.reset();
 }
 
 TraceDrain PyHost::drain_trace() {
   const std::lock_guard lock(collector_mutex_);
-  return collector_ != nullptr ? collector_->take() : host().drain_trace();
+  if (collector_ != nullptr) return collector_->take();
+  TraceDrain drain = host().drain_trace();
+  watch_.take(drain);
+  return drain;
 }
 
 void bind_host(py::module_& module) {
+  py::class_<JobBound>(module, "JobBound",
+                       "The bound of one kind of job: of all that a component executes between two waits.")
+      .def(py::init([](std::string component, std::string after, std::string until, time_ns_t bound_ns) {
+             return JobBound{std::move(component), std::move(after), std::move(until), bound_ns};
+           }),
+           py::kw_only(), py::arg("component"), py::arg("after"), py::arg("until"), py::arg("bound_ns"))
+      .def_readonly("component", &JobBound::component)
+      .def_readonly("after", &JobBound::after,
+                    "The wait that it follows; of the first job after a start the initial state.")
+      .def_readonly("until", &JobBound::until, "The wait that it leads to.")
+      .def_readonly("bound_ns", &JobBound::bound_ns, "From the job's instant to its wait.");
+  py::class_<JobFigures>(module, "JobFigures",
+                         "What was measured of a kind of job since its bound is watched.")
+      .def_readonly("job", &JobFigures::job)
+      .def_readonly("jobs", &JobFigures::jobs, "How many came to their wait.")
+      .def_readonly("violations", &JobFigures::violations, "How many of them took longer than the bound.")
+      .def_readonly("longest_ns", &JobFigures::longest_ns);
+  py::class_<BoundViolation>(
+      module, "BoundViolation",
+      "Jobs of a component that took longer than their bound, with times of the worst one.")
+      .def_readonly("job", &BoundViolation::job)
+      .def_readonly("instant_ns", &BoundViolation::instant_ns)
+      .def_readonly("response_ns", &BoundViolation::response_ns)
+      .def_readonly("count", &BoundViolation::count)
+      .def_property_readonly(
+          "records",
+          [](const BoundViolation& self) {
+            return to_bytes(self.records.data(), self.records.size() * sizeof(TraceRecord));
+          },
+          "As of a TraceDrain: of all components, from a while before the instant to the end of the job.");
   py::class_<PyCommitted>(
       module, "Committed",
       "A transaction that is in force. Others may change what it did while its report is asked for.")
@@ -365,6 +422,20 @@ Waits up to phase_timeout_ns for the next release to measure phase_actual_ns.)")
       .def("collect_trace", &PyHost::collect_trace, py::arg("period_ns"), Unlocked(),
            "Let a native thread empty the rings so often, for drain_trace(); 0: no longer.")
       .def("drain_trace", &PyHost::drain_trace, Unlocked())
+      .def("watch_jobs", &PyHost::watch_jobs, py::arg("bounds"), py::arg("revision"), Unlocked(),
+           R"(Compare each job from now on with its bound, until the architecture changes.
+
+False: it has another revision, or a change is open. Unless collect_trace() asks for the trace, its records are lost.)")
+      .def("end_job_watch", &PyHost::end_job_watch, Unlocked(),
+           "Watch no bounds, and take no records for it.")
+      .def(
+          "watches_jobs", [](PyHost& self) { return self.job_watch().holds(); }, Unlocked(),
+          "Whether bounds are watched: not after a change, until they are given again.")
+      .def(
+          "job_figures", [](PyHost& self) { return self.job_watch().figures(); }, Unlocked(),
+          "Of each bound that is watched.")
+      .def("take_violations", &PyHost::take_violations, Unlocked(),
+           "Of each component that exceeded a bound since the last call one.")
       .def("trace_components", &PyHost::trace_components,
            "Names by the numbers that records carry; those of removed components stay.")
       .def("trace_names", [](PyHost&) { return Host::trace_names(); })

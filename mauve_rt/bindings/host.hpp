@@ -4,6 +4,7 @@
 
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/deploy/host.hpp"
+#include "mauve_rt/deploy/job_watch.hpp"
 #include "mauve_rt/deploy/trace_collector.hpp"
 
 #include "translate.hpp"
@@ -17,7 +18,9 @@ class PyHost {
   using PublishedSample = std::tuple<std::string, std::vector<std::byte>, time_ns_t>;
 
   explicit PyHost(PyArchitecture& architecture)
-      : registry_(architecture.registry), architecture_(architecture.architecture) {}
+      : registry_(architecture.registry),
+        architecture_(architecture.architecture),
+        watch_(architecture.architecture) {}
   virtual ~PyHost() = default;
   PyHost(const PyHost&) = delete;
   PyHost& operator=(const PyHost&) = delete;
@@ -34,13 +37,24 @@ class PyHost {
   /// In virtual time whoever drives it drains in time, without a thread.
   void collect_trace(time_ns_t period_ns);
   TraceDrain drain_trace();
+  /// As JobWatch::watch(), for jobs from now on. On threads the records are taken from then on, and lost to drain_trace()
+  /// unless collect_trace() asks for them; in virtual time whoever drives it drains.
+  bool watch_jobs(const std::vector<JobBound>& bounds, std::uint64_t revision);
+  void end_job_watch();
+  const JobWatch& job_watch() const noexcept { return watch_; }
+  std::vector<BoundViolation> take_violations() { return watch_.take_violations(); }
 
  private:
+  void renew_collector();
+
   bool woken() const noexcept { return woken_.load(std::memory_order_acquire); }
 
   const PluginRegistry& registry_;
   Architecture& architecture_;
+  JobWatch watch_;
   std::mutex collector_mutex_;
+  bool is_watched_{false};       // under collector_mutex_
+  time_ns_t keep_period_ns_{0};  // under collector_mutex_; 0: what is collected is for the watch alone
   std::unique_ptr<TraceCollector> collector_;  // under collector_mutex_
   std::atomic<bool> woken_{false};             // release/acquire: set once, for good
   std::uint32_t seen_change_{0};               // of the one thread that waits for changes

@@ -1,6 +1,6 @@
 """What `mauve list` prints: what runs, which cores, what is connected; four tables that 80 columns hold."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import UTC, datetime
 from typing import Any
 
@@ -30,7 +30,13 @@ _WAIT_FREE_KINDS = ("shared_data", "latest_value", "ring_buffer")  # the other k
 def print_components(reply: Any, out: Console | None = None) -> None:
     """A ListComponents reply: tables, authors of changes, faults, states that last, what real time lacks."""
     out = out or console()
-    for table in (_components(reply), _cores(reply), _connections(reply), _memory(reply)):
+    for table in (
+        _components(reply),
+        bounds_table(reply.components),
+        _cores(reply),
+        _connections(reply),
+        _memory(reply),
+    ):
         if table.row_count:
             out.print(table)
     for name, element, author in _authors(reply):
@@ -96,6 +102,22 @@ def _components(reply: Any) -> Table:
             str(component.releases),
             str(component.overruns),
         )
+    return table
+
+
+def bounds_table(components: Iterable[Any]) -> Table:
+    """A line for each kind of job with a bound."""
+    table = _table("component", "job")
+    for column in ("longest", "bound", "above it"):
+        table.add_column(column, no_wrap=True, justify="right")
+    for component in components:
+        for job in component.bounds:
+            is_first = [job.after] == job.states[:1]  # after a start: it begins in its state
+            if is_first and not job.jobs:
+                continue
+            violations = f"[bold red]{job.violations}[/]" if job.violations else "0"
+            way = " -> ".join([*([] if is_first else [job.after]), *job.states, job.until])
+            table.add_row(component.name, way, duration(job.longest_ns), duration(job.bound_ns), violations)
     return table
 
 

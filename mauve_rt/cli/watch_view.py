@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 from rich.text import Text
 
-from mauve_rt.cli.list_view import STATES
+from mauve_rt.cli.list_view import STATES, bounds_table
 from mauve_rt.cli.watched import Figures, Followed, WatchedExecutor
 from mauve_rt.counts import duration
 from mauve_rt.supervision.truth import truth_word
@@ -104,6 +104,11 @@ def view(
             for executor in executors
             if executor.last_event is not None
         ]
+        parts += [
+            _violation(executor, of_whom(executor.name))
+            for executor in executors
+            if executor.last_violation is not None
+        ]
     if has_keys:
         parts.append(_footer(selection))
     return Group(*parts)
@@ -188,6 +193,8 @@ def _opened(executor: WatchedExecutor, name: str) -> Iterator[RenderableType]:
     for line in (component.fault, figures.remark):
         if line:
             yield Text(line, style="bold red")
+    if component.bounds:
+        yield bounds_table([component])
     ports = _table("port", "connected to", "value")
     ports.add_column("", no_wrap=True)
     for port in component.ports:
@@ -213,6 +220,12 @@ def _event(executor: WatchedExecutor, whose: str) -> Text:
     outcome = "done" if event.success else f"refused: {event.message}"
     who = f" by {event.requested_by}" if event.requested_by else ""
     return Text(f"last change {when:%H:%M:%S}  {whose}{event.request}{who}: {outcome}", style="dim")
+
+
+def _violation(executor: WatchedExecutor, whose: str) -> Text:
+    violation = executor.last_violation
+    when = datetime.fromtimestamp(violation.stamp.sec).astimezone()
+    return Text(f"above its bound {when:%H:%M:%S}  {whose}{violation.message}", style="bold red")
 
 
 def _footer(selection: Selection) -> Text:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from mauve_msgs.msg import ReconfigurationEvent
+from mauve_msgs.msg import BoundViolation, ReconfigurationEvent
 from mauve_msgs.srv import ListComponents, ListRules, ReadValues
 from mauve_rt.cli.client import Client
 from mauve_rt.trace.format.message_decoding import Decoder
@@ -55,6 +55,7 @@ class WatchedExecutor:
         self.figures: dict[str, Figures] = {}
         self.values: dict[str, Followed] = {}
         self.last_event: Any = None
+        self.last_violation: Any = None
         self._wanted = [*values]
         self._opened: list[str] = []
         self._decoders: dict[str, Decoder] = {}
@@ -65,6 +66,7 @@ class WatchedExecutor:
         self._list_rules = client.poll(ListRules, f"{name}/list_rules", every_s=LIST_S)
         self._read = client.poll(ReadValues, f"{name}/read_values", every_s=VALUES_S)
         client.follow(ReconfigurationEvent, f"{name}/events", self._take_event)
+        client.follow(BoundViolation, f"{name}/violations", self._take_violation)
 
     @property
     def is_there(self) -> bool:
@@ -158,6 +160,9 @@ class WatchedExecutor:
 
     def _take_event(self, event: Any) -> None:
         self.last_event = event
+
+    def _take_violation(self, violation: Any) -> None:
+        self.last_violation = violation
 
 
 def _execution_maxima(told: Mapping[str, str]) -> Iterator[int]:

@@ -1,12 +1,14 @@
 """The executor's values as messages of mauve_msgs."""
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 from mauve_msgs.msg import (
     ArchitectureState,
     ComponentInfo,
     ComponentStatus,
+    JobBound,
     PortInfo,
     Probation,
     RealtimeStatus,
@@ -40,6 +42,11 @@ from mauve_rt.file_schema.words import cut, shown
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.threads import ThreadInfo
 
+if TYPE_CHECKING:
+    from mauve_rt.control.bound_watch import WatchedBound
+
+Bounds = Mapping[str, Iterable["WatchedBound"]]
+
 _PORT_KINDS = {"read": PortInfo.READ, "write": PortInfo.WRITE, "call": PortInfo.CALL, "event": PortInfo.EVENT}
 _MAX_PRIORITY = 255
 
@@ -52,10 +59,11 @@ def component_info(
     code: tuple[int, int] = (0, 0),
     probations: Iterable[ProbationRecord] = (),
     shadows: Iterable[ShadowRecord] = (),
+    bounds: "Iterable[WatchedBound]" = (),
 ) -> Any:
     """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element.
 
-    `code`: generation of the core's code, and when it was built.
+    `code`: generation of the core's code, and when it was built; `bounds`: of its jobs.
     """
     return ComponentInfo(
         name=component.name,
@@ -87,6 +95,7 @@ def component_info(
         overrun=component.overrun,
         states=[_state_info(state) for state in component.states],
         authors=_authored(authors),
+        bounds=[JobBound(**asdict(bound)) for bound in bounds],
     )
 
 
@@ -110,12 +119,14 @@ def _state_age(component: ComponentDescription) -> dict[str, Any]:
     }
 
 
-def component_infos(runtime: Runtime) -> list[Any]:
-    """ComponentInfo of every component."""
-    return _component_infos(runtime, runtime.components())
+def component_infos(runtime: Runtime, bounds: Bounds | None = None) -> list[Any]:
+    """ComponentInfo of every component; `bounds`: of the jobs of components, by name."""
+    return _component_infos(runtime, runtime.components(), bounds or {})
 
 
-def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription]) -> list[Any]:
+def _component_infos(
+    runtime: Runtime, components: Iterable[ComponentDescription], bounds: Bounds
+) -> list[Any]:
     authors = runtime.authors()
     shadows = runtime.shadows()
     probations: dict[str, list[ProbationRecord]] = {}
@@ -129,6 +140,7 @@ def _component_infos(runtime: Runtime, components: Iterable[ComponentDescription
             code=runtime.code_of(part.core),
             probations=probations.get(part.name, ()),
             shadows=[record for record in shadows if record.component == part.name],
+            bounds=bounds.get(part.name, ()),
         )
         for part in components
     ]
@@ -161,7 +173,7 @@ def trace_architecture(
     """TraceArchitecture as it was observed; `uses` and `others`: as for task_list."""
     return TraceArchitecture(
         epoch_ns=runtime.deployment_epoch_ns(),
-        components=_component_infos(runtime, observed.components),
+        components=_component_infos(runtime, observed.components, {}),
         threads=task_list(runtime, observed.components, uses, others=others),
     )
 

@@ -287,6 +287,18 @@ struct Slow : Counter {
   }
 };
 
+/// Executes for so many milliseconds, and not less.
+inline void spin_for(double time_ms) {
+  const mauve::time_ns_t until = mauve::monotonic_now_ns() + static_cast<mauve::time_ns_t>(time_ms * 1e6);
+  while (mauve::monotonic_now_ns() < until) {
+  }
+}
+
+/// Executes for `step` milliseconds.
+struct Spinning : Counter {
+  void act() override { spin_for(shell().step.value()); }
+};
+
 /// Executes until it receives a number; counts -1 when it begins. Gives up after half a minute; after three seconds where
 /// its label is "briefly": a condemned component receives nothing.
 struct Held : Counter {
@@ -640,6 +652,56 @@ class Lamp final : public mauve::Resource {
   Look look{*this};
 };
 
+/// Executes for `hold_ms` under the lock of a vault.
+struct LockingShell : mauve::Shell {
+  mauve::Property<double>& hold_ms =
+      property("hold_ms", 0.0, {.unit = "ms", .minimum = 0.0, .maximum = 100.0});
+  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
+  mauve::CallPort<void(double)>& vault = call_port<void(double)>("vault", "executor_tests/Hold");
+};
+
+struct Locking : mauve::Core<LockingShell> {
+  void act() { shell().vault(shell().hold_ms.value()); }
+};
+
+struct LockingFsm : mauve::Fsm<LockingShell, Locking> {
+  void define() override {
+    mauve::State& run = execution("Lock", "act", &Locking::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(shell().period_ms.value()));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+/// A lock that is held for as long as the caller says.
+class Vault final : public mauve::Resource {
+ public:
+  Vault() : Resource("executor_tests/Vault", "") { offer(hold); }
+  void set_name(const std::string& name) override {
+    Resource::set_name(name);
+    mutex_.set_trace_id(mauve::TraceNames::intern(name));
+  }
+
+ private:
+  class Hold final : public mauve::CallService<void(double)> {
+   public:
+    explicit Hold(Vault& owner) : CallService("hold", "executor_tests/Hold"), owner_(owner) {}
+    void call(double time_ms) override {
+      const std::lock_guard lock(owner_.mutex_);
+      spin_for(time_ms);
+    }
+
+   private:
+    Vault& owner_;
+  };
+
+  mauve::PiMutex mutex_;
+
+ public:
+  Hold hold{*this};
+};
+
 /// What is read is what it was told.
 class Window final : public mauve::Resource {
  public:
@@ -708,6 +770,12 @@ MAUVE_PLUGINS(registry) {
   registry.core<Wasteful>("executor_tests/Wasteful", shell);
   registry.core<Held>("executor_tests/Held", shell);
   registry.core<Slow>("executor_tests/Slow", shell);
+  registry.core<Spinning>("executor_tests/Spinning", shell);
+  const std::string locking = "executor_tests/LockingShell";
+  registry.shell<LockingShell>(locking);
+  registry.core<Locking>("executor_tests/Locking", locking);
+  registry.fsm<LockingFsm>("executor_tests/LockingFsm", locking);
+  registry.resource<Vault>("executor_tests/Vault");
   registry.core<Hanging>("executor_tests/Hanging", shell);
   registry.core<Patient>("executor_tests/Patient", shell);
   registry.core<Clinging>("executor_tests/Clinging", shell);

@@ -7,8 +7,8 @@
 
 namespace mauve {
 
-TraceCollector::TraceCollector(Architecture& architecture, time_ns_t period_ns)
-    : architecture_(architecture), period_ns_(period_ns) {
+TraceCollector::TraceCollector(Architecture& architecture, time_ns_t period_ns, JobWatch* watch, bool keeps)
+    : architecture_(architecture), period_ns_(period_ns), watch_(watch), keeps_(keeps) {
   const auto entry = [](void* self) -> void* {
     static_cast<TraceCollector*>(self)->run();
     return nullptr;
@@ -28,7 +28,7 @@ TraceCollector::~TraceCollector() {
 
 TraceDrain TraceCollector::take() {
   const LockGuard lock(mutex_);
-  TraceDrain last = architecture_.drain_trace();
+  TraceDrain last = drain();
   collected_.insert(collected_.end(), last.records.begin(), last.records.end());
   last.records = std::exchange(collected_, {});
   return last;
@@ -46,8 +46,14 @@ void TraceCollector::run() {
 
 void TraceCollector::collect() {
   if (collected_.size() > kMostRecords) return;
-  const TraceDrain drain = architecture_.drain_trace();
-  collected_.insert(collected_.end(), drain.records.begin(), drain.records.end());
+  const TraceDrain collected = drain();
+  if (keeps_) collected_.insert(collected_.end(), collected.records.begin(), collected.records.end());
+}
+
+TraceDrain TraceCollector::drain() {
+  TraceDrain drain = architecture_.drain_trace();
+  if (watch_ != nullptr) watch_->take(drain);
+  return drain;
 }
 
 }  // namespace mauve

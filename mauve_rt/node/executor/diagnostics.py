@@ -2,7 +2,7 @@
 
 import resource
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
@@ -21,15 +21,20 @@ from mauve_rt._kernel import (
 from mauve_rt.control.open_changes import long_ones, open_changes
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.state_age import in_words
+from mauve_rt.counts import counted
 from mauve_rt.interfaces.descriptions import held_elements
 from mauve_rt.model.schema import DiagnosticsModel, ThresholdModel
 from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.bounds import WatchedBounds
 from mauve_rt.node.executor.recording import Recording, RecordingStatus
 from mauve_rt.node.executor.rules import OwnRules
 from mauve_rt.node.executor.sentinel import Sentinel
 from mauve_rt.node.executor.state_folder import StateFolder
 from mauve_rt.node.shared.loopback import udp_backlog
 from mauve_rt.supervision.truth import truth_word
+
+if TYPE_CHECKING:
+    from mauve_rt.control.bound_watch import WatchedBound
 
 _ONE = ThresholdModel(warn=1)
 _DEFAULTS = DiagnosticsModel(overruns=_ONE, allocations=_ONE, page_faults=_ONE)
@@ -49,6 +54,7 @@ class Diagnostics:
         *,
         folder: StateFolder,
         sentinel: Sentinel,
+        bounds: WatchedBounds,
     ) -> None:
         self._node = node
         self._runtime = runtime
@@ -57,6 +63,7 @@ class Diagnostics:
         self._rules = rules
         self._folder = folder
         self._sentinel = sentinel
+        self._bounds = bounds
         self._publisher = node.create_publisher(DiagnosticArray, "/diagnostics", QoSProfile(depth=10))
         self._told: dict[tuple[str, str], int] = {}
         self._allocation_counting = allocation_counting()
@@ -66,7 +73,10 @@ class Diagnostics:
         """Publish once; `error`: why the last lifecycle transition failed; `clock`: its recent step."""
         maxima = {recent.component: recent for recent in self._runtime.take_recent_maxima()}
         parts = [part for part in self._runtime.components() if part.name in maxima]
-        array = DiagnosticArray(status=[self._component(part, maxima[part.name]) for part in parts])
+        bounds = self._bounds.of_components()
+        array = DiagnosticArray(
+            status=[self._component(part, maxima[part.name], bounds.get(part.name, ())) for part in parts]
+        )
         array.header.stamp = self._node.get_clock().now().to_msg()
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
@@ -90,8 +100,14 @@ class Diagnostics:
         array.status.append(self._process(error, clock))
         self._publisher.publish(array)
 
-    def _component(self, part: ComponentDescription, recent: RecentMaxima) -> Any:
+    def _component(
+        self, part: ComponentDescription, recent: RecentMaxima, bounds: "Sequence[WatchedBound]"
+    ) -> Any:
         remarks = [*self._remarks(part, recent)]
+        violations = sum(one.violations for one in bounds)
+        if new := self._more(part.name, "violations", violations):
+            text = f"bounds: {counted(new, 'job')} took longer than proved since the last status"
+            remarks.append((DiagnosticStatus.WARN, text))
         if part.state == "FAULTED":
             remarks = [(DiagnosticStatus.ERROR, part.fault)]
         elif part.fell_back:
@@ -124,6 +140,12 @@ class Diagnostics:
             values[f"execution_mean_ns[{time.state}]"] = time.mean_ns
             values[f"execution_max_ns[{time.state}]"] = time.max_ns
             values[f"execution_recent_max_ns[{time.state}]"] = recent.execution_ns.get(time.state, 0)
+        if bounds:
+            values["violations"] = violations
+        for one in bounds:
+            job = f"{one.after} -> {one.until}"
+            values[f"bound_ns[{job}]"] = one.bound_ns
+            values[f"longest_ns[{job}]"] = one.longest_ns
         return self._status(part.name, level, message, values)
 
     def _refusals(self, resource: ResourceDescription) -> Any:

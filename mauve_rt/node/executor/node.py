@@ -23,6 +23,7 @@ from mauve_rt.counts import counted
 from mauve_rt.errors import MauveError, exception_text, one_line
 from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.bounds import WatchedBounds
 from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
 from mauve_rt.node.executor.lost_supervisors import LostSupervisors
 from mauve_rt.node.executor.mirrors import Mirrors
@@ -107,6 +108,7 @@ class ExecutorNode(LifecycleNode):
             watch=self.watch,
             folder=rules_folder(settings),
         )
+        self._bounds = WatchedBounds(self, runtime, self._bound, publish=self._state.send, watch=self.watch)
         self._state.rules = self._rules.names
         self._state.changed = self._sentinel.follow
         self._folder = StateFolder(
@@ -137,6 +139,7 @@ class ExecutorNode(LifecycleNode):
             self._rules,
             folder=self._folder,
             sentinel=self._sentinel,
+            bounds=self._bounds,
         )
         self._topic_watch = TopicWatch(self.get_logger())
         self._name_watch = NameWatch(self)
@@ -160,6 +163,7 @@ class ExecutorNode(LifecycleNode):
             state=self._state,
             parameters=self._properties,
             rules=self._rules,
+            bounds=self._bounds,
             load_rules=self._load_rules,
             watch=self.watch,
             warnings=self._name_watch.warnings,
@@ -283,6 +287,7 @@ class ExecutorNode(LifecycleNode):
             self._bound.start()
             self._rules.start()  # first, so that ~/state names them from the first time on
             self._state.start(self._runtime.host)
+            self._bounds.start()
             if self._node_watch is not None:  # else it is not open yet
                 NodeWatch.notify("READY=1")
         self.get_logger().info(f"activated: {counted(len(self._runtime.components()), 'component')}")
@@ -343,6 +348,7 @@ class ExecutorNode(LifecycleNode):
                 self._runtime.deactivate()
                 self.watch.guarded("~/state", self._state.refresh)()
                 self.get_logger().info("deactivated: outputs are safe, components parked")
+            self._bounds.stop()
             self._state.stop()
             self._bound.stop()
         self._sentinel.disarm()  # all outputs of the stop are sent

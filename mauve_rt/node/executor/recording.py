@@ -41,6 +41,7 @@ _OWN = {  # recorded in any case
     "~/events": "mauve_msgs/msg/ReconfigurationEvent",
     "~/decisions": "mauve_msgs/msg/SupervisorDecision",
     "~/shadow": "mauve_msgs/msg/Shadow",
+    "~/violations": "mauve_msgs/msg/BoundViolation",
     "~/trace/batches": "mauve_msgs/msg/TraceBatch",
     "~/trace/names": "mauve_msgs/msg/TraceNames",
     "~/trace/architecture": "mauve_msgs/msg/TraceArchitecture",

@@ -50,6 +50,7 @@ from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
 from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.bounds import WatchedBounds
 from mauve_rt.node.executor.console import log_request
 from mauve_rt.node.executor.events import Event
 from mauve_rt.node.executor.mirrors import Mirrors, topics
@@ -85,6 +86,7 @@ class Services:
         state: StatePublisher,
         parameters: Parameters,
         rules: OwnRules,
+        bounds: WatchedBounds,
         load_rules: Callable[[str, Sequence[str]], tuple[Code, str]],
         warnings: Callable[[], list[str]],
         access: Callable[[], str],
@@ -98,6 +100,7 @@ class Services:
         self._bound = bound
         self._state = state
         self._rules = rules
+        self._bounds = bounds
         self._load_rules = load_rules
         self._logger = node.get_logger()
         # The change is made by then: what is wrong here is told, and no refusal of it.
@@ -191,7 +194,7 @@ class Services:
     def _list(self, _request: Any, response: Any) -> Any:
         response.instance_id = self._runtime.instance_id
         response.revision = self._runtime.revision
-        response.components = component_infos(self._runtime)
+        response.components = component_infos(self._runtime, self._bounds.of_components())
         response.realtime = realtime_status(self._runtime)
         response.resources = resource_infos(self._runtime, self._bound.bindings())
         response.access = self._access()

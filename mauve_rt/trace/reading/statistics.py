@@ -123,6 +123,22 @@ def response_times(records: Records) -> Values:
     return np.asarray(records["time_ns"][waits] - records["a"][releases], np.int64)
 
 
+def job_response_times(trace: Trace, component: str) -> dict[tuple[str, str], Values]:
+    """Response times of one component by the wait before a job and the wait after it.
+
+    The first job after a start follows no wait: for it, the initial state is named.
+    """
+    records = trace.of(component)
+    releases, waits = following(records, Kind.RELEASE, (Kind.WAIT,), (Kind.RELEASE, Kind.STOP))
+    times_ns = np.asarray(records["time_ns"][waits] - records["a"][releases], np.int64)
+    befores, afters = records["name"][releases], records["name"][waits]
+    return {
+        (trace.name(int(before)), trace.name(int(after))): times_ns[(befores == before) & (afters == after)]
+        for before in np.unique(befores)
+        for after in np.unique(afters[befores == before])
+    }
+
+
 def state_spans(records: Records) -> Spans:
     """Executions of states of one component, in order."""
     return _spans(records, *following(records, Kind.STATE_BEGIN, (Kind.STATE_END,), (Kind.STATE_BEGIN,)))

@@ -12,6 +12,7 @@ from mauve_rt.trace.reading.decisions import ExplainedDecision, explained_decisi
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
 from mauve_rt.trace.reading.statistics import ComponentStatistics, component_statistics
 from mauve_rt.trace.reading.trace import Trace
+from mauve_rt.trace.reading.violations import VIOLATION_TYPE, Violation, violations
 from mauve_rt.trace.report.cycles import Array, releases_of, slices_by_state
 from mauve_rt.trace.report.requests import RequestTold, join_requests
 
@@ -65,6 +66,8 @@ class Analysis:
     """Of the executor's rules, by time."""
     misses: list[DeadlineMiss] = field(default_factory=list)
     """Marked as such: what runs marks overruns."""
+    violations: list[Violation] = field(default_factory=list)
+    """Jobs above their bound, by time."""
 
     @property
     def duration_ns(self) -> int:
@@ -124,6 +127,7 @@ def analyse(
         zero_ns=begin_ns if zero_ns is None else zero_ns,
         decisions=explained_decisions(trace),
         misses=_misses(trace),
+        violations=violations(trace.messages(VIOLATION_TYPE), trace.components),
     )
 
 

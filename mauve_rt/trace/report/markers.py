@@ -1,16 +1,18 @@
-"""Single events on a component's row: overruns, faults, stops, starts, the user's marks."""
+"""Single events on a component's row: overruns, faults, stops, starts, marks, jobs above a bound."""
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
 from mauve_rt.trace.format.records import Kind, Records
+from mauve_rt.trace.reading.violations import Violation
 from mauve_rt.trace.report.cycles import Array
 
 MARKER = np.dtype(
     [("time_ns", "<i8"), ("number", "<i8"), ("name", "<i8"), ("value", "<i8"), ("skipped", "<i8")]
 )
-"""value: of an overrun how late in ns, of a mark the user's a. Merged: worst value, sum of skipped."""
+"""value: how late in ns, of a mark the user's a. Merged: worst value, sum of skipped."""
 
 KINDS = {
     Kind.OVERRUN: "overrun",
@@ -19,8 +21,11 @@ KINDS = {
     Kind.START: "start",
     Kind.MARK: "mark",
 }
+VIOLATION = "violation"
+"""Kind of the jobs above their bound."""
 MOST = 20_000
 """Markers of one kind in a row; more are merged, far below what a screen could tell apart."""
+NO_NAME = -1
 _LARGEST = 2**53
 
 
@@ -31,10 +36,20 @@ class Markers(NamedTuple):
     entries: Array
 
 
-def markers_of(records: Records) -> list[Markers]:
-    """Markers of a component by kind; kinds without one are left out."""
+def markers_of(records: Records, violations: Iterable[Violation] = ()) -> list[Markers]:
+    """Markers of a component by kind; kinds without one are left out. `violations`: of the component."""
     found = [Markers(word, _entries(records[records["kind"] == kind], kind)) for kind, word in KINDS.items()]
+    found.append(Markers(VIOLATION, _above_bound([*violations])))
     return [one for one in found if len(one.entries)]
+
+
+def _above_bound(violations: list[Violation]) -> Array:
+    entries = np.zeros(len(violations), MARKER)
+    entries["time_ns"] = [one.end_ns for one in violations]
+    entries["number"] = [one.jobs for one in violations]
+    entries["value"] = [one.excess_ns for one in violations]
+    entries["name"] = NO_NAME
+    return entries if len(entries) <= MOST else _merged(entries)
 
 
 def _entries(rows: Records, kind: Kind) -> Array:

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from mauve_rt.trace.reading.statistics import ComponentStatistics
+from mauve_rt.trace.reading.violations import Violation
 from mauve_rt.trace.report.analysis import Analysis, Fault
 from mauve_rt.trace.report.machine import Machine
 from mauve_rt.trace.report.overruns import culprits
@@ -29,6 +30,7 @@ def sentences_on(analysis: Analysis, machine: Machine) -> list[Sentence]:
     return ranked(
         [
             *_misses(analysis),
+            *_violations(analysis),
             *_overruns(analysis, machine),
             *_stalls(analysis, machine),
             *_swaps(analysis),
@@ -49,6 +51,19 @@ def _misses(analysis: Analysis) -> Iterator[Sentence]:
     for one in analysis.misses[:_NAMED]:
         at = time_text(one.time_ns - analysis.zero_ns)
         yield Sentence(BAD, f"{one.component} missed its deadline at {at} by {time_text(one.late_ns)}.")
+
+
+def _violations(analysis: Analysis) -> Iterator[Sentence]:
+    worst: dict[str, Violation] = {}
+    for one in sorted(analysis.violations, key=lambda one: -one.excess_ns):
+        worst.setdefault(one.component, one)
+    if worst:
+        jobs = counted(sum(one.jobs for one in analysis.violations), "job")
+        yield Sentence(
+            ATTENTION, f"{jobs} took longer than proved: correct the declared times, or the model."
+        )
+    for one in [*worst.values()][:_NAMED]:
+        yield Sentence(ATTENTION, f"At {time_text(one.end_ns - analysis.zero_ns)}: {one.message}.")
 
 
 def _scope(analysis: Analysis) -> Iterator[Sentence]:

@@ -11,7 +11,7 @@ from mauve_rt.trace.report.columns import Columns
 from mauve_rt.trace.report.cycles import Array, Times
 from mauve_rt.trace.report.decisions import decision_flags, decision_places
 from mauve_rt.trace.report.detail import BUDGET, Detail, choose_detail
-from mauve_rt.trace.report.markers import Markers, markers_of
+from mauve_rt.trace.report.markers import VIOLATION, Markers, markers_of
 from mauve_rt.trace.report.values import values_data
 
 _WORST = 20
@@ -23,7 +23,7 @@ _SHOWN_SWAPS = 5_000
 def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str, Any], str]:
     """Return the timeline's description (JSON) and its columns (base64)."""
     components = analysis.trace.components
-    markers = {component: markers_of(analysis.trace.of(component)) for component in components}
+    markers = {component: _markers(analysis, component) for component in components}
     tracks = [track for name in components for track in analysis.slices[name].values()]
     tracks += [analysis.releases[name] for name in components]
     instants_ns = interesting_instants(analysis, markers)
@@ -46,6 +46,11 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
     return described, columns.data()
 
 
+def _markers(analysis: Analysis, component: str) -> list[Markers]:
+    above = (one for one in analysis.violations if one.component == component)
+    return markers_of(analysis.trace.of(component), above)
+
+
 def interesting_instants(analysis: Analysis, markers: dict[str, list[Markers]]) -> Times:
     """Instants to look around: reconfigurations, decisions, what went wrong, begin and end."""
     found: list[Any] = [[analysis.begin_ns, analysis.end_ns]]
@@ -54,7 +59,7 @@ def interesting_instants(analysis: Analysis, markers: dict[str, list[Markers]]) 
     found += [[swap.measured.parked_ns, swap.measured.armed_ns] for swap in analysis.swaps[:_SHOWN_SWAPS]]
     for component, kinds in markers.items():
         for kind, entries in kinds:
-            if kind == "overrun":
+            if kind in ("overrun", VIOLATION):
                 found.append(_worst(entries, "value", _JUMPS)["time_ns"])
             elif kind != "mark":
                 found.append(entries["time_ns"][:_JUMPS])
@@ -160,7 +165,7 @@ def swap_title(what: str, to_core: str = "") -> str:
 def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, list[list[int]]]:
     """Places to go to, [row, time, length], by kind and in the order of time."""
     found: dict[str, list[list[int]]] = {
-        kind: [] for kind in ("swap", "overrun", "fault", "wakeup", "response")
+        kind: [] for kind in ("swap", "overrun", "fault", VIOLATION, "wakeup", "response")
     }
     found["decision"] = decision_places(analysis)
     found["swap"] = [
@@ -179,7 +184,7 @@ def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, l
         [rows[one.component], one.time_ns - analysis.begin_ns, one.late_ns]
         for one in analysis.misses[:_JUMPS]
     ]
-    for kind in ("swap", "overrun", "fault"):
+    for kind in ("swap", "overrun", "fault", VIOLATION):
         found[kind].sort(key=lambda place: place[1])
     return found
 

@@ -12,6 +12,7 @@ _JUMPS = (
     ("decision", "Decisions"),
     ("miss", "Deadlines missed"),
     ("overrun", "Overruns"),
+    ("violation", "Above their bound"),
     ("fault", "Faults"),
     ("wakeup", "Worst wake-ups"),
     ("response", "Worst responses"),
@@ -38,6 +39,7 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
     names = "".join(_row_name(analysis, index) for index in range(len(analysis.trace.components)))
     rules = '<div class="rules-name"><b>rules</b></div>' if described["decisions"] else ""
     shown = [*_KEYS, *([("decision", "decision of a rule")] if rules else [])]
+    shown += [("violation", "job above its bound")] if described["jumps"]["violation"] else []
     shown += [("kept", "kept in full")] if described["bucket"] else []
     keys = "".join(f'<span><i class="key-{kind}"></i>{name}</span>' for kind, name in shown)
     html = (

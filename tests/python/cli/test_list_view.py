@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from mauve_msgs.msg import ComponentInfo, HeldElement, PortInfo, ResourceInfo
+from mauve_msgs.msg import ComponentInfo, HeldElement, JobBound, PortInfo, ResourceInfo
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli.list_view import STATES, print_components
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
@@ -201,3 +201,18 @@ def test_what_rules_and_persons_have_their_hand_on() -> None:
         "one: core held by rule quiet: replace_core one p/Safe; without rules: replace_core one p/Usual",
         "two: state held by a person, who stopped it: stop two; without rules: not known",
     ]
+
+
+def test_each_job_has_its_bound_beside_the_longest_measured_response() -> None:
+    figures = {"until": "Pause", "states": ["Act"], "bound_ns": 3_000_000}
+    bounds = [
+        JobBound(after="Act", **figures),
+        JobBound(after="Pause", longest_ns=2_500_000, jobs=9, **figures),
+        JobBound(after="Event", longest_ns=4_000_000, jobs=9, violations=2, **figures),
+    ]
+    lines = _printed(ListComponents.Response(components=[ComponentInfo(name="control", bounds=bounds)]))
+    jobs = [line.split()[1:] for line in lines if "->" in line]
+    assert jobs == [
+        ["Pause", "->", "Act", "->", "Pause", "2.5", "ms", "3", "ms", "0"],
+        ["Event", "->", "Act", "->", "Pause", "4", "ms", "3", "ms", "2"],
+    ], "a first job after a start is shown once there was one"

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from rich.console import Console
 
-from mauve_msgs.msg import ComponentInfo, PortInfo, ReconfigurationEvent, RuleInfo
+from mauve_msgs.msg import BoundViolation, ComponentInfo, JobBound, PortInfo, ReconfigurationEvent, RuleInfo
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli.watch_verb import press
 from mauve_rt.cli.watch_view import SORTED_BY, Selection, sparkline, view
@@ -40,6 +40,7 @@ def known(**others: Any) -> Known:
         "figures": figures,
         "values": {},
         "last_event": None,
+        "last_violation": None,
         "is_there": True,
         "opened": "",
     }
@@ -161,3 +162,16 @@ def test_keys_open_a_component() -> None:
 )
 def test_sparklines(numbers: list[float], bars: str) -> None:
     assert sparkline(numbers) == bars
+
+
+def test_the_last_job_above_its_bound() -> None:
+    lines = shown(known(last_violation=BoundViolation(message="component 'control': too long")))
+    assert any(line.startswith("above its bound") and "component 'control'" in line for line in lines)
+
+
+def test_an_opened_component_shows_its_bounds() -> None:
+    bound = JobBound(after="Pause", states=["Act"], until="Pause", bound_ns=3_000_000, longest_ns=2_000_000)
+    executor = known()
+    executor.listed.components[0].bounds = [bound]
+    text = "\n".join(shown(executor, selection=Selection(opened=(EXECUTOR, "guidance"))))
+    assert "Pause -> Act -> Pause" in text

@@ -195,11 +195,15 @@
     overrun(context, x, y) {
       polygon(context, [[x - 4.5, y - 4], [x + 4.5, y - 4], [x, y + 4.5]]);
     },
+    violation(context, x, y) {
+      polygon(context, [[x - 4.5, y + 4], [x + 4.5, y + 4], [x, y - 4.5]]);
+    },
     fault(context, x, y) {
       polygon(context, [[x, y - 6], [x + 6, y], [x, y + 6], [x - 6, y]]);
     },
   };
-  const ORDER = ["mark", "start", "stop", "overrun", "fault"];
+  const ORDER = ["mark", "start", "stop", "violation", "overrun", "fault"];
+  const SERIOUS = ["violation", "overrun", "fault"];
 
   function polygon(context, points) {
     context.beginPath();
@@ -208,20 +212,20 @@
   }
 
   mauve.markerColour = (kind, colours) =>
-    ({ mark: colours.accent, start: colours.good, stop: colours.ink, overrun: colours.bad, fault: colours.bad })[kind];
+    SERIOUS.includes(kind) ? colours.bad : { mark: colours.accent, start: colours.good, stop: colours.ink }[kind];
 
   function drawMarkers(context, row, scale, top, bottom, colours) {
     const sorted = [...row.markers].sort((a, b) => ORDER.indexOf(a.kind) - ORDER.indexOf(b.kind));
     for (const markers of sorted) {
       const colour = mauve.markerColour(markers.kind, colours);
-      const serious = markers.kind === "overrun" || markers.kind === "fault";
+      const serious = SERIOUS.includes(markers.kind);
       let i = mauve.lastAtOrBefore(markers.time, scale.time(-8)) + 1;
       while (i < markers.time.length) {
         const x = scale.x(markers.time[i]);
         if (x > scale.width + 8) break;
         context.fillStyle = colour;
         if (serious) {
-          const late = markers.kind === "overrun" ? markers.value[i] * scale.perNs : 0;
+          const late = markers.value[i] * scale.perNs; // 0 of a fault
           if (late > 2) {
             context.globalAlpha = 0.22;
             context.fillRect(x - late, top, late, bottom - top);
@@ -362,7 +366,7 @@
     }
     model.rows.forEach(function (row, index) {
       for (const markers of row.markers) {
-        if (markers.kind !== "overrun" && markers.kind !== "fault") continue;
+        if (!SERIOUS.includes(markers.kind)) continue;
         context.fillStyle = colours.bad;
         for (let i = 0; i < markers.time.length; ) {
           const x = scale.x(markers.time[i]);

@@ -126,6 +126,7 @@
         facts.push([count > 1 ? "late by at most" : "late by", mauve.timeText(one.value[worst])]);
         facts.push(["instants skipped", String(skipped)]);
       }
+      if (one.kind === "violation") facts.push(["above its bound by at most", mauve.timeText(one.value[worst])]);
       blocks.push({ title, colour: mauve.markerColour(one.kind, timeline.colours), facts });
     }
     return blocks;

@@ -5,6 +5,7 @@
 #include "mauve_rt/architecture/architecture.hpp"
 #include "mauve_rt/base/seam/condition_variable.hpp"
 #include "mauve_rt/base/seam/thread.hpp"
+#include "mauve_rt/deploy/job_watch.hpp"
 
 namespace mauve {
 
@@ -15,8 +16,9 @@ class TraceCollector {
   /// When so many records wait to be taken the rings are left alone, which count what they lose: 64 MiB.
   static constexpr std::size_t kMostRecords = (64UL << 20U) / sizeof(TraceRecord);
 
-  /// Starts the thread. [non-rt]
-  TraceCollector(Architecture& architecture, time_ns_t period_ns);
+  /// Starts the thread. `watch` gets all records, too; without `keeps` no other taker does. [non-rt]
+  TraceCollector(Architecture& architecture, time_ns_t period_ns, JobWatch* watch = nullptr,
+                 bool keeps = true);
   /// Ends the thread; what was not taken is gone. [non-rt]
   ~TraceCollector();
   TraceCollector(const TraceCollector&) = delete;
@@ -28,9 +30,12 @@ class TraceCollector {
  private:
   void run();
   void collect() MAUVE_REQUIRES(mutex_);
+  TraceDrain drain() MAUVE_REQUIRES(mutex_);
 
   Architecture& architecture_;
   time_ns_t period_ns_;
+  JobWatch* watch_;
+  bool keeps_;
   Mutex mutex_;
   ConditionVariable end_;
   bool ending_ MAUVE_GUARDED_BY(mutex_){false};
