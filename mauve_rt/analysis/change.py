@@ -8,8 +8,13 @@ change only where an old job is released, so these instants x are tried.
 Before, a participant's new core adopts the state of the old one, and at x takes it: both together at most
 `handover_ns`, at some instant of a window.
 
-Source: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively scheduled systems", RTSS 1992, for
-one instant instead of a request for each task.
+A change at an idle instant finds no job of a participant pending, nor one of a component above the lowest
+participant. No busy window of these has T in it: it has the demand before the change or that after it, each
+with the handover. Components below the lowest participant, or with its priority, may have any window.
+
+Sources: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively scheduled systems", RTSS 1992, for
+one instant instead of a request for each task; Tindell, Alonso, "A very simple protocol for mode changes in
+priority preemptive systems", 1996, for the idle instant.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -75,8 +80,11 @@ class Participant:
 Member = Component | Participant
 
 
-def times_during(members: Sequence[Member]) -> dict[str, DigraphTimes]:
+def times_during(members: Sequence[Member], *, is_idle: bool = False) -> dict[str, DigraphTimes]:
     """The bounds of all components of one CPU, by name, whenever the change comes.
+
+    `is_idle`: at an instant at which no job of a participant is pending, nor one of a component above the
+    lowest of them.
 
     The longest `jitter_ns` of all components counts for each of them.
 
@@ -88,7 +96,21 @@ def times_during(members: Sequence[Member]) -> dict[str, DigraphTimes]:
     jitter_ns = max((one.jitter_ns for one in merged.values()), default=0)
     mixes = {_name(one): _Mix(one, jitter_ns) for one in members}
     loads = {_name(one): _loads(one) for one in members}
-    return {name: _times(name, merged, mixes, loads, jitter_ns) for name in merged}
+    apart = _without_window_over_change(members) if is_idle else frozenset()
+    return {
+        name: _times(name, merged, mixes, loads, jitter_ns, has_change_in_window=name not in apart)
+        for name in merged
+    }
+
+
+def _without_window_over_change(members: Sequence[Member]) -> frozenset[str]:
+    """Components of whose busy windows none has an idle instant of the change in it."""
+    lowest = min((one.any.priority for one in members if isinstance(one, Participant)), default=0)
+    others = [one for one in members if isinstance(one, Component)]
+    meets_equals = any(one.priority == lowest for one in others)
+    above = [one for one in others if one.priority > lowest]
+    participants = [one.any for one in members if isinstance(one, Participant)]
+    return frozenset(one.name for one in (*above, *participants) if one.priority > lowest or not meets_equals)
 
 
 def _name(member: Member) -> str:
@@ -101,6 +123,8 @@ def _times(
     mixes: "Mapping[str, _Mix]",
     loads: Mapping[str, tuple[Fraction, Fraction]],
     jitter_ns: int,
+    *,
+    has_change_in_window: bool,
 ) -> DigraphTimes:
     check_time_limit()
     own, components = merged[name], [*merged.values()]
@@ -114,7 +138,8 @@ def _times(
         _together([mixes[each] for each in higher]), _together([mixes[each] for each in equal]), blocked_ns
     )
     try:
-        return _worst([mixes[each] for each in (name, *higher, *equal)], delay, jitter_ns)
+        level = [mixes[each] for each in (name, *higher, *equal)]
+        return _worst(level, delay, jitter_ns, has_change_in_window=has_change_in_window)
     except UnboundedError as error:
         return DigraphTimes(reason=str(error), blocking_ns=blocked_ns)
 
@@ -132,7 +157,9 @@ def _task(member: Member, *, is_new: bool) -> DigraphTask:
     return _NOTHING if part is None else part.task
 
 
-def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int) -> DigraphTimes:
+def _worst(
+    mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int, *, has_change_in_window: bool
+) -> DigraphTimes:
     """The longest of each job of the first one, over all instants of the change."""
     own, works = mixes[0], _together(mixes)
 
@@ -144,7 +171,8 @@ def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int) -> DigraphTime
     before_ns = window_at_ns(FOREVER_NS)
     longest: dict[Job, int] = {}
     walls: dict[str, int] = {}
-    for change_ns in _instants([mix for mix in mixes if mix.is_changed]):
+    changed = [mix for mix in mixes if mix.is_changed]
+    for change_ns in _instants(changed) if has_change_in_window else (0, FOREVER_NS):
         for path in own.jobs_until(window_at_ns(change_ns) + jitter_ns):
             response_ns = delay.finish_ns(path) - (path.release_ns - jitter_ns)
             longest[path.job] = max(response_ns, longest.get(path.job, 0))

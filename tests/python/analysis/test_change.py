@@ -5,7 +5,7 @@ from random import Random
 import pytest
 from analysis_machines import MS, execution, machine, wait
 from random_digraphs import random_digraph
-from schedule_simulation import RUN, Release, simulate
+from schedule_simulation import RUN, Release, simulate, simulated_jobs
 
 from mauve_rt.analysis import change as module
 from mauve_rt.analysis.change import Member, Participant, times_during
@@ -75,6 +75,29 @@ def test_an_overload_after_the_change_is_said() -> None:
     a = Participant(loop("a", 3, 10, 80), loop("a", 9, 10, 80))
     found = times_during([a, loop("c", 2, 10, 60)])["c"]
     assert found.reason == "the utilization at this priority is 1.1: nothing is left"
+
+
+# ---- at an idle instant
+
+
+def test_at_an_idle_instant_no_window_has_both() -> None:
+    """But for the component below the participants, whose own job may be under way then."""
+    a = Participant(loop("a", 6, 16, 80), loop("a", 2, 16, 80), handover_ns=1)
+    b = Participant(loop("b", 2, 16, 70), loop("b", 6, 16, 70))
+    c, high = loop("c", 6, 48, 60), loop("high", 1, 48, 90)
+    found = {name: one.response_ns for name, one in times_during([a, b, c, high], is_idle=True).items()}
+    always = responses([a, b, c, high])
+    assert found == {"high": 1, "a": 8, "b": 10, "c": always["c"]}
+    assert always["b"] == 13
+
+
+def test_one_with_the_priority_of_the_lowest_participant_may_be_under_way() -> None:
+    members = [Participant(loop("a", 4, 16, 70), loop("a", 1, 16, 70)), loop("same", 5, 40, 70)]
+    members.append(Participant(loop("b", 1, 16, 80), loop("b", 4, 16, 80)))
+    idle = {name: one.response_ns for name, one in times_during(members, is_idle=True).items()}
+    always = responses(members)
+    assert idle["b"] == 4
+    assert {name: idle[name] for name in ("a", "same")} == {name: always[name] for name in ("a", "same")}
 
 
 # ---- against runs
@@ -164,6 +187,69 @@ def test_no_run_with_a_change_is_above_its_bound(jitter: int) -> None:
                 reached += longest[name] == one.response_ns
     assert bounded > 400
     assert reached > bounded / 10
+
+
+def seeded_runs(
+    seed: str, parts: dict[str, Member], change_ns: int, *, jitter: int
+) -> dict[str, list[Release]]:
+    """Of one seed the same until the change, whenever that is."""
+    return {
+        name: one_run(Random(f"{seed} {name}"), one, change_ns, until=240, jitter=jitter)  # noqa: S311 - no secrets
+        for name, one in parts.items()
+    }
+
+
+def idle_instant(
+    members: list[Member],
+    olds: dict[str, list[Release]],
+    finished: dict[str, list[tuple[int, int]]],
+    since_ns: int,
+) -> int | None:
+    """The first one at which no participant has a job pending and none above the lowest one is ready."""
+    lowest = min(one.any.priority for one in members if isinstance(one, Participant))
+    spans: list[tuple[int, int]] = []
+    for one in members:
+        is_participant = isinstance(one, Participant)
+        own = one.any if is_participant else one
+        if is_participant or own.priority > lowest:
+            begins = [each.arrival_ns if is_participant else each.release_ns for each in olds[own.name]]
+            spans += zip(begins, (end for _, end in finished[own.name]), strict=True)
+    return next(
+        (at for at in range(since_ns, 200) if not any(begin < at < end for begin, end in spans)), None
+    )
+
+
+@pytest.mark.parametrize("jitter", [0, 3])
+def test_no_run_with_a_change_at_an_idle_instant_is_above_its_bound(jitter: int) -> None:
+    bounded = shorter = 0
+    for seed in range(400):
+        random = Random(seed)  # noqa: S311 - not for secrets
+        members = random_members(random, jitter=jitter)
+        found, always = times_during(members, is_idle=True), times_during(members)
+        parts = dict(zip(found, members, strict=True))
+        components = [one.any if isinstance(one, Participant) else one for one in members]
+        longest = dict.fromkeys(parts, 0)
+        for number in range(8):
+            olds = seeded_runs(f"{seed} {number}", parts, 240, jitter=jitter)
+            at = idle_instant(members, olds, simulated_jobs(components, olds), random.randint(0, 120))
+            if at is not None:
+                for name, response_ns in simulate(
+                    components, seeded_runs(f"{seed} {number}", parts, at, jitter=jitter)
+                ).items():
+                    longest[name] = max(longest[name], response_ns)
+        for name, one in found.items():
+            if one.response_ns is not None:
+                assert longest[name] <= one.response_ns, f"seed {seed}, {name}"
+                bounded += 1
+                shorter += always[name].response_ns is None or one.response_ns < always[name].response_ns
+    assert bounded > 400
+    assert shorter > 40
+
+
+def test_runs_find_that_the_instant_of_the_change_is_not_idle(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "idle_instant", lambda *found: found[-1])
+    with pytest.raises(AssertionError, match="seed"):
+        test_no_run_with_a_change_at_an_idle_instant_is_above_its_bound(0)
 
 
 # ---- a run that misses a deadline in a change
