@@ -16,21 +16,29 @@ constexpr time_ns_t kHour = s_to_ns(3600);
 struct Jobs {
   std::atomic<int> taken{0};                    // the newest revision that a component has taken
   std::atomic<int> old{0};                      // jobs with older parts than that, or that lasted until then
+  std::atomic<time_ns_t> first_new_ns{kForever};  // the earliest clock of a job with the newest parts
   std::atomic<time_ns_t> bystander_ns{0};       // clock of the job of the one that takes no part; 0: none
   std::atomic<time_ns_t> earliest_ns{kForever}; // the earliest of these at a take
 };
 
+void lower(std::atomic<time_ns_t>& least, time_ns_t value) {
+  time_ns_t seen = least;
+  while (value < seen && !least.compare_exchange_weak(seen, value)) {
+  }
+}
+
 /// A core of a revision: says so when it executes after a newer one has been taken anywhere.
 struct JobCore : TestCore {
-  JobCore(std::shared_ptr<Jobs> shared, int its_revision, time_ns_t its_spin_ns)
-      : jobs(std::move(shared)), revision(its_revision), spin_ns(its_spin_ns) {}
+  JobCore(std::shared_ptr<Jobs> shared, int its_revision, time_ns_t its_spin_ns, time_ns_t its_adopt_ns)
+      : jobs(std::move(shared)), revision(its_revision), spin_ns(its_spin_ns), adopt_ns(its_adopt_ns) {}
 
-  bool adopt(const CoreBase& /*old*/) override { return true; }
+  bool adopt(const CoreBase& /*old*/) override {
+    if (adopt_ns != 0) sleep_for(adopt_ns);
+    return true;
+  }
   void take(CoreBase& /*old*/) MAUVE_RT override {
     jobs->taken = revision;
-    if (const time_ns_t clock_ns = jobs->bystander_ns; clock_ns != 0) {
-      if (clock_ns < jobs->earliest_ns) jobs->earliest_ns = clock_ns;
-    }
+    if (const time_ns_t clock_ns = jobs->bystander_ns; clock_ns != 0) lower(jobs->earliest_ns, clock_ns);
   }
   void act() override {
     TestCore::act();
@@ -39,11 +47,13 @@ struct JobCore : TestCore {
     while (monotonic_now_ns() < until_ns) {
     }
     if (jobs->taken > revision) ++jobs->old;
+    if (jobs->taken == revision) lower(jobs->first_new_ns, clock_ns());
   }
 
   std::shared_ptr<Jobs> jobs;
   int revision;
   time_ns_t spin_ns;
+  time_ns_t adopt_ns;
 };
 
 /// Executes when another component has written.
@@ -57,10 +67,11 @@ struct EventFsm : Fsm<TestShell, TestCore> {
   }
 };
 
-bool has_two_cpus() {
+/// Before a test keeps its own threads off one of them.
+const bool kHasTwoCpus = [] {
   cpu_set_t usable;
   return sched_getaffinity(0, sizeof(usable), &usable) == 0 && CPU_ISSET(0, &usable) && CPU_ISSET(1, &usable);
-}
+}();
 
 template <typename Way>
 class IdleChange : public OnBothHosts<Way> {
@@ -68,8 +79,8 @@ class IdleChange : public OnBothHosts<Way> {
   static constexpr bool is_virtual = OnBothHosts<Way>::is_virtual;
   static constexpr time_ns_t kJob = us_to_ns(60);
 
-  std::unique_ptr<JobCore> core_of(int revision) {
-    return std::make_unique<JobCore>(jobs, revision, is_virtual ? 0 : kJob);
+  std::unique_ptr<JobCore> core_of(int revision, time_ns_t adopt_ns = 0) {
+    return std::make_unique<JobCore>(jobs, revision, is_virtual ? 0 : kJob, is_virtual ? 0 : adopt_ns);
   }
   template <typename FsmType = TestFsm>
   Component& add_job(const std::string& name, std::int64_t period_ms, int priority, std::vector<int> cpus) {
@@ -91,9 +102,15 @@ class IdleChange : public OnBothHosts<Way> {
     this->architecture.connect("a", "output", "x", "write");
     this->architecture.connect("e", "input", "x", "read");
   }
+  /// One agrees late, at any moment of the periods of the others, and not always the lowest.
   Transaction change_all(int revision) {
+    constexpr std::array kNames{"a", "b", "c", "d", "e"};
+    const auto last = static_cast<std::size_t>(revision) % kNames.size();
     Transaction change;
-    for (const char* name : {"a", "b", "c", "d", "e"}) change.replace_core(name, core_of(revision));
+    for (std::size_t i = 0; i < kNames.size(); ++i) {
+      const time_ns_t adopt_ns = i == last ? us_to_ns(100 + 41 * (revision % 47)) : 0;
+      change.replace_core(kNames.at(i), core_of(revision, adopt_ns));
+    }
     return change;
   }
   TransactionReport commit_idle(Transaction change, time_ns_t within_ns = s_to_ns(60)) {
@@ -113,15 +130,20 @@ class IdleChange : public OnBothHosts<Way> {
     this->deploy();
     this->host.run_for(ms_to_ns(25));
     int made = 0;
+    time_ns_t instant_ns = 0;
     for (int revision = 1; revision <= kChanges; ++revision) {
       pass(us_to_ns(37 * (revision % 53)));
+      ASSERT_GE(jobs->first_new_ns, instant_ns) << "before change " << revision;
       try {
-        EXPECT_TRUE(commit_idle(change_all(revision)).is_idle);
+        const TransactionReport report = commit_idle(change_all(revision));
+        EXPECT_TRUE(report.is_idle);
+        instant_ns = report.instant_ns;
         ++made;
       } catch (const Error& error) {
         EXPECT_TRUE(is_virtual) << error.what();  // a job is pending, and no time passes
         EXPECT_EQ(ErrorCode::timeout, error.code());
       }
+      jobs->first_new_ns = kForever;
       ASSERT_EQ(0, jobs->old) << "change " << revision;
     }
     EXPECT_GT(made, is_virtual ? kChanges / 10 : kChanges - 1);
@@ -153,7 +175,7 @@ TYPED_TEST(IdleChange, LeavesNoJobPendingOnOneCpu) {
 }
 
 TYPED_TEST(IdleChange, LeavesNoJobPendingOnTwoCpus) {
-  if (!has_two_cpus()) GTEST_SKIP() << "needs CPUs 0 and 1";
+  if (!kHasTwoCpus) GTEST_SKIP() << "needs CPUs 0 and 1";
   this->add_five({0}, {1});
   this->change_often();
 }
@@ -221,8 +243,9 @@ class IdleChangeOnThreads : public IdleChange<OnThreads> {
     EXPECT_EQ(why, code);
     EXPECT_EQ(1.0, architecture.component("a").shell_as<TestShell>().gain.value());
   }
-  /// At each take: is a job of the bystander under way whose clock lies before T?
-  void expect_bystander_idle(std::vector<int> cpus) {
+  /// No job of a component that takes no part is under way at a take, but one whose clock is `since(report)` or later.
+  template <typename Since>
+  void expect_bystander_idle(std::vector<int> cpus, Since&& since) {
     add_job("a", 1, 80, {kComponentsCpu});
     add_job("b", 3, 30, std::move(cpus));
     Component& between = add("between", 2, {.priority = 60, .cpus = {kComponentsCpu}});
@@ -239,10 +262,11 @@ class IdleChangeOnThreads : public IdleChange<OnThreads> {
       pass(us_to_ns(37 * (revision % 53)));
       jobs->earliest_ns = kForever;
       Transaction change;
-      change.replace_core("a", core_of(revision)).replace_core("b", core_of(revision));
+      const time_ns_t adopt_ns = us_to_ns(100 + 41 * (revision % 47));  // then a is the last to agree
+      change.replace_core("a", core_of(revision, adopt_ns)).replace_core("b", core_of(revision));
       const TransactionReport report = commit_idle(std::move(change));
       wait_until([&] { return (*host).open_changes().empty(); }, "both takes");
-      EXPECT_GE(jobs->earliest_ns, report.instant_ns) << "change " << revision;
+      ASSERT_GE(jobs->earliest_ns, since(report)) << "change " << revision;
     }
   }
 
@@ -265,11 +289,17 @@ TEST_F(IdleChangeOnThreads, IsCalledOffByAShutdown) {
 
 TEST_F(IdleChangeOnThreads, LeavesNoJobOfAnotherPendingAboveTheLowest) {
   if (!may_use_fifo()) GTEST_SKIP() << "needs the right to SCHED_FIFO: else no component stands above another";
-  expect_bystander_idle({kComponentsCpu});
+  // The lowest closes, in the visit in which it takes: a job that is released after that begins later.
+  const auto visit_of_lowest = [this](const TransactionReport& /*report*/) {
+    const auto parked =
+        records_of((*host).drain_trace(), TraceKind::parked, architecture.component("b").task().number());
+    return parked.empty() ? kForever : parked.back().time_ns;
+  };
+  expect_bystander_idle({kComponentsCpu}, visit_of_lowest);
 }
 
 TEST_F(IdleChangeOnThreads, LeavesNoJobOfASilentParticipantPending) {
-  expect_bystander_idle({});
+  expect_bystander_idle({}, [](const TransactionReport& report) { return report.instant_ns; });
   EXPECT_TRUE(records_of((*host).drain_trace(), TraceKind::reconfiguration,
                          architecture.component("between").task().number())
                   .empty());
