@@ -10,7 +10,7 @@ namespace {
 
 constexpr const char* kSteps[] = {
     "Waiting",    "Noticed", "Looked",        "Adopting",   "AdoptHung", "Voting",  "Counting",  "Closing",
-    "Publishing", "Looking", "Taking",        "Passing",    "Clearing",  "Raising", "Beginning", "Executing",
+    "IdleLooking", "IdleScanning", "IdleClosing", "Publishing", "Looking", "Taking",        "Passing",    "Clearing",  "Raising", "Beginning", "Executing",
     "Hung",       "Parking", "LookingParked", "CallingOff", "Parked",    "Claimed", "Ended"};
 constexpr const char* kRequests[] = {"Awaiting",  "UrgentCall",  "Locking",    "Posting",  "Notifying",
                                      "VotingFor", "CountingFor", "ClosingFor", "Deciding", "Retracting",

@@ -21,6 +21,9 @@ enum class Step : std::uint8_t {
   kVoting,      // raises the cut by its last clock
   kCounting,    // counts its vote
   kClosing,     // has counted the last vote
+  kIdleLooking,   // all have voted: looks at the cut, then at each participant
+  kIdleScanning,  // looks whether participant `at` has a job pending
+  kIdleClosing,   // closes the cut if it is the one that it saw
   kPublishing,  // of a twin only: has chosen T, has not published it
   kLooking,     // looks at the cut, in its wait
   kTaking,      // puts the new parts in
@@ -74,6 +77,8 @@ struct Component {
   std::uint8_t last;     // ghost: the last clock that was executed
   std::uint8_t entered;  // by which a vote raises: the last clock executed, or T - 1 of the last change
   std::uint8_t chosen;   // of a twin only: a T that is not published
+  std::uint8_t seen;     // the bits of the cut that it looks for an idle instant at
+  std::uint8_t at;       // participant
   Slot slot;
   std::uint8_t slot_change;   // whose record, unless the slot is empty
   std::uint8_t mutex_holder;  // of the command mutex: 0, or 1 + change
