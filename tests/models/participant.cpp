@@ -122,7 +122,8 @@ void Model::vote(State state, int i) {
 /// What a component tells of itself: a pending instant in a wait, until it begins to execute; the next one when it waits again.
 bool Model::has_job_at(const State& state, int i, int frontier) const {
   const Component& component = state.components[i];
-  if (component.is_parked() || component.step == Step::kClaimed || component.step == Step::kEnded) return false;
+  if (component.is_parked() || component.step == Step::kClaimed || component.step == Step::kEnded)
+    return false;
   const bool executes = component.step == Step::kBeginning || component.step == Step::kExecuting ||
                         component.step == Step::kHung;
   if (executes && is(Twin::kDueMovesAtRelease)) return component.clock + kPeriod[i] <= frontier;
@@ -241,15 +242,13 @@ void Model::raise(State state, int i) {
   Component& component = state.components[i];
   const bool raises = !is(Twin::kReleaseDoesNotRaise) && !is(Twin::kChooseThenPublish);
   const bool raises_always = options_.idle && waits_for_events(i) && !is(Twin::kEventWritesNothing);
-  const CutWord seen = call_cut(state, component.slot_change,
-                                [&](auto& cut) {
-                                  if (!raises) return cut.look();
-                                  return raises_always ? cut.raise_always(component.clock)
-                                                       : cut.raise(component.clock);
-                                });
+  const CutWord seen = call_cut(state, component.slot_change, [&](auto& cut) {
+    if (!raises) return cut.look();
+    return raises_always ? cut.raise_always(component.clock) : cut.raise(component.clock);
+  });
   if (seen.is_off()) return go(state, i, Step::kClearing);
-  const bool has_reached = component.clock >= seen.instant_ns() ||
-                           (options_.idle && !is(Twin::kEventKeepsItsClock));
+  const bool has_reached =
+      component.clock >= seen.instant_ns() || (options_.idle && !is(Twin::kEventKeepsItsClock));
   if (seen.is_closed() && has_reached) return go(state, i, after_decision());
   component.slot = Slot::kPosted, component.after = After::kWait;
   go(state, i, Step::kBeginning);

@@ -113,7 +113,8 @@ INSTANTIATE_TEST_SUITE_P(
                   "a late old value replaces a new one"}),
     [](const auto& info) { return std::string(info.param.name); });
 
-constexpr const char *kPending = "a job is pending at T", *kOldAfterClose = "a job has old parts after the idle close";
+constexpr const char *kPending = "a job is pending at T",
+                     *kOldAfterClose = "a job has old parts after the idle close";
 
 INSTANTIATE_TEST_SUITE_P(
     TwinOfTheCheckedClose, WeakenedChangeModel,

@@ -146,7 +146,8 @@ class RandomIdle {
       const bool is_event = i != 0 && dice_.once_in(3);
       TaskSettings settings{.priority = 20 + 10 * dice_.below(5)};
       if (is_one_cpu || dice_.once_in(2)) settings.cpus = {0};
-      std::unique_ptr<FsmBase> fsm = is_event ? new_part<FsmBase, IdleEventFsm>() : new_part<FsmBase, IdleFsm>();
+      std::unique_ptr<FsmBase> fsm =
+          is_event ? new_part<FsmBase, IdleEventFsm>() : new_part<FsmBase, IdleFsm>();
       architecture.add_component(name(i), new_part<Shell, TestShell>(), core(i, {}), std::move(fsm), settings)
           .set_property("period_ms", std::int64_t{1 + dice_.below(5)});
       if (is_event) architecture.connect(name(i), "input", "x", "read");

@@ -313,9 +313,9 @@ std::vector<std::shared_ptr<Component>> TransactionCommit::Work::find_silent() c
     const Task& task = component->task();
     // One that is FAULTED or STOPPING would call the change off; it starts nothing that a change does not start.
     const bool may_run = task.state() == ComponentState::running || task.is_parked();
-    const bool takes_part =
-        std::any_of(changes_.begin(), changes_.end(),
-                    [&](const Change& change) { return change.draft->component == component; });
+    const bool takes_part = std::any_of(changes_.begin(), changes_.end(), [&](const Change& change) {
+      return change.draft->component == component;
+    });
     if (!may_run || takes_part || task.state() == ComponentState::faulted) continue;
     if (std::any_of(running.begin(), running.end(),
                     [&](const TaskSettings* each) { return may_delay(task.settings(), *each); }))

@@ -606,10 +606,10 @@ void Commit::throw_not_idle() const {
     detail.component = pending->task->name();
     detail.found = "a pending job of " + pending->task->name() + " at the last try";
   }
-  throw Error(ErrorCode::timeout,
-              "no instant at which all of " + names + " are idle came within " + within +
-                  "; nothing was changed",
-              detail);
+  throw Error(
+      ErrorCode::timeout,
+      "no instant at which all of " + names + " are idle came within " + within + "; nothing was changed",
+      detail);
 }
 
 void Commit::throw_timeout() const {

@@ -14,11 +14,11 @@ constexpr time_ns_t kHour = s_to_ns(3600);
 
 /// What all cores of a test share.
 struct Jobs {
-  std::atomic<int> taken{0};                    // the newest revision that a component has taken
-  std::atomic<int> old{0};                      // jobs with older parts than that, or that lasted until then
+  std::atomic<int> taken{0};  // the newest revision that a component has taken
+  std::atomic<int> old{0};    // jobs with older parts than that, or that lasted until then
   std::atomic<time_ns_t> first_new_ns{kForever};  // the earliest clock of a job with the newest parts
-  std::atomic<time_ns_t> bystander_ns{0};       // clock of the job of the one that takes no part; 0: none
-  std::atomic<time_ns_t> earliest_ns{kForever}; // the earliest of these at a take
+  std::atomic<time_ns_t> bystander_ns{0};         // clock of the job of the one that takes no part; 0: none
+  std::atomic<time_ns_t> earliest_ns{kForever};   // the earliest of these at a take
 };
 
 void lower(std::atomic<time_ns_t>& least, time_ns_t value) {
@@ -114,9 +114,10 @@ class IdleChange : public OnBothHosts<Way> {
     return change;
   }
   TransactionReport commit_idle(Transaction change, time_ns_t within_ns = s_to_ns(60)) {
-    return (*this->host).commit(std::move(change), {.timeouts = {.commit_ns = s_to_ns(60), .phase_ns = 0},
-                                                    .idle = true,
-                                                    .idle_within_ns = within_ns});
+    return (*this->host)
+        .commit(std::move(change), {.timeouts = {.commit_ns = s_to_ns(60), .phase_ns = 0},
+                                    .idle = true,
+                                    .idle_within_ns = within_ns});
   }
   void pass(time_ns_t duration_ns) {
     if constexpr (is_virtual) {
@@ -288,7 +289,8 @@ TEST_F(IdleChangeOnThreads, IsCalledOffByAShutdown) {
 }
 
 TEST_F(IdleChangeOnThreads, LeavesNoJobOfAnotherPendingAboveTheLowest) {
-  if (!may_use_fifo()) GTEST_SKIP() << "needs the right to SCHED_FIFO: else no component stands above another";
+  if (!may_use_fifo())
+    GTEST_SKIP() << "needs the right to SCHED_FIFO: else no component stands above another";
   // The lowest closes, in the visit in which it takes: a job that is released after that begins later.
   const auto visit_of_lowest = [this](const TransactionReport& /*report*/) {
     const auto parked =

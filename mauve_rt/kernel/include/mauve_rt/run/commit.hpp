@@ -315,7 +315,8 @@ class Commit {
 
   std::vector<Participant> participants_;
   std::vector<Participant*> order_;  // by the tasks' numbers: who commands two tasks takes them in this order
-  std::vector<Participant*> posted_;  // as they are posted to: those of an idle one from the highest priority to the lowest
+  std::vector<Participant*>
+      posted_;  // as they are posted to: those of an idle one from the highest priority to the lowest
   std::vector<CommitAction*> actions_;
   bool yields_{false};
   bool is_hosted_{false};
@@ -323,7 +324,7 @@ class Commit {
   bool is_idle_{false};
   time_ns_t idle_within_ns_{0};
   bool is_one_cpu_{false};
-  const Participant* closer_{nullptr};  // the lowest that runs; nullptr: all are parked
+  const Participant* closer_{nullptr};           // the lowest that runs; nullptr: all are parked
   Atomic<const Participant*> pending_{nullptr};  // at the last look for an idle instant
   Atomic<bool> has_own_{false};
   time_ns_t timeout_ns_{0};
