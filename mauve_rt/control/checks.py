@@ -25,9 +25,10 @@ def check_form(request: Request) -> None:
     Raises:
         RefusalError: INVALID.
     """
-    if not math.isfinite(request.timeout_s) or not 0.0 <= request.timeout_s <= MAX_TIMEOUT_S:
-        text = f"bad timeout: expected 0 (the default) to {MAX_TIMEOUT_S:g} s, found {request.timeout_s:g}"
-        raise RefusalError(Code.INVALID, text)
+    for name, found_s in (("timeout", request.timeout_s), ("idle_within_s", request.idle_within_s)):
+        if not math.isfinite(found_s) or not 0.0 <= found_s <= MAX_TIMEOUT_S:
+            text = f"bad {name}: expected 0 (the default) to {MAX_TIMEOUT_S:g} s, found {found_s:g}"
+            raise RefusalError(Code.INVALID, text)
     if request.clock_ns < 0:
         text = f"bad clock_ns: expected 0 or an instant, found {request.clock_ns}"
         raise RefusalError(Code.INVALID, text)
