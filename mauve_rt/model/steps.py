@@ -28,7 +28,7 @@ from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
 
 _SHOWN_VALUE = 60
 SHOWN_STEP = 300
-LONGEST_IDLE_S = 10.0  # as the executor takes it
+LONGEST_IDLE_S = 10.0
 
 
 @dataclass(frozen=True)

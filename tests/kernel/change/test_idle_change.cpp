@@ -74,7 +74,7 @@ const bool kHasTwoCpus = [] {
 }();
 
 template <typename Way>
-class IdleChange : public OnBothHosts<Way> {
+class Rule10Idle : public OnBothHosts<Way> {
  protected:
   static constexpr bool is_virtual = OnBothHosts<Way>::is_virtual;
   static constexpr time_ns_t kJob = us_to_ns(60);
@@ -168,20 +168,20 @@ class IdleChange : public OnBothHosts<Way> {
 
   std::shared_ptr<Jobs> jobs = std::make_shared<Jobs>();
 };
-TYPED_TEST_SUITE(IdleChange, EveryHost, HostNames);
+TYPED_TEST_SUITE(Rule10Idle, EveryHost, HostNames);
 
-TYPED_TEST(IdleChange, LeavesNoJobPendingOnOneCpu) {
+TYPED_TEST(Rule10Idle, LeavesNoJobPendingOnOneCpu) {
   this->add_five({kComponentsCpu}, {kComponentsCpu});
   this->change_often();
 }
 
-TYPED_TEST(IdleChange, LeavesNoJobPendingOnTwoCpus) {
+TYPED_TEST(Rule10Idle, LeavesNoJobPendingOnTwoCpus) {
   if (!kHasTwoCpus) GTEST_SKIP() << "needs CPUs 0 and 1";
   this->add_five({0}, {1});
   this->change_often();
 }
 
-TYPED_TEST(IdleChange, IsCalledOffWhereNoIdleInstantComes) {
+TYPED_TEST(Rule10Idle, IsCalledOffWhereNoIdleInstantComes) {
   this->deploy_one_that_is_behind();
   try {
     this->commit_idle(this->set_both(), ms_to_ns(50));
@@ -197,7 +197,7 @@ TYPED_TEST(IdleChange, IsCalledOffWhereNoIdleInstantComes) {
   EXPECT_FALSE(report.is_idle) << "without the option the change is made";
 }
 
-TYPED_TEST(IdleChange, OfStoppedComponentsIsMadeAtOnce) {
+TYPED_TEST(Rule10Idle, OfStoppedComponentsIsMadeAtOnce) {
   this->add("a");
   this->add("b");
   this->deploy();
@@ -208,7 +208,7 @@ TYPED_TEST(IdleChange, OfStoppedComponentsIsMadeAtOnce) {
   EXPECT_EQ(2.0, this->architecture.component("b").template shell_as<TestShell>().gain.value());
 }
 
-TYPED_TEST(IdleChange, CannotBePrepared) {
+TYPED_TEST(Rule10Idle, CannotBePrepared) {
   this->add("a");
   this->add("b");
   this->deploy();
@@ -218,9 +218,9 @@ TYPED_TEST(IdleChange, CannotBePrepared) {
   EXPECT_THAT(text, HasSubstr("a prepared transaction waits for no idle instant"));
 }
 
-class IdleChangeOnThreads : public IdleChange<OnThreads> {
+class Rule10IdleOnThreads : public Rule10Idle<OnThreads> {
  protected:
-  ~IdleChangeOnThreads() override {
+  ~Rule10IdleOnThreads() override {
     host.shutdown();
     if (requester.joinable()) requester.join();
   }
@@ -276,19 +276,19 @@ class IdleChangeOnThreads : public IdleChange<OnThreads> {
   ErrorCode code{};
 };
 
-TEST_F(IdleChangeOnThreads, IsCalledOffByAStop) {
+TEST_F(Rule10IdleOnThreads, IsCalledOffByAStop) {
   request();
   host.stop("a");
   expect_called_off(ErrorCode::wrong_revision);
 }
 
-TEST_F(IdleChangeOnThreads, IsCalledOffByAShutdown) {
+TEST_F(Rule10IdleOnThreads, IsCalledOffByAShutdown) {
   request();
   host.shutdown();
   expect_called_off(ErrorCode::not_configured);
 }
 
-TEST_F(IdleChangeOnThreads, LeavesNoJobOfAnotherPendingAboveTheLowest) {
+TEST_F(Rule10IdleOnThreads, LeavesNoJobOfAnotherPendingAboveTheLowest) {
   if (!may_use_fifo())
     GTEST_SKIP() << "needs the right to SCHED_FIFO: else no component stands above another";
   // The lowest closes, in the visit in which it takes: a job that is released after that begins later.
@@ -300,7 +300,7 @@ TEST_F(IdleChangeOnThreads, LeavesNoJobOfAnotherPendingAboveTheLowest) {
   expect_bystander_idle({kComponentsCpu}, visit_of_lowest);
 }
 
-TEST_F(IdleChangeOnThreads, LeavesNoJobOfASilentParticipantPending) {
+TEST_F(Rule10IdleOnThreads, LeavesNoJobOfASilentParticipantPending) {
   expect_bystander_idle({}, [](const TransactionReport& report) { return report.instant_ns; });
   EXPECT_TRUE(records_of((*host).drain_trace(), TraceKind::reconfiguration,
                          architecture.component("between").task().number())
