@@ -213,7 +213,7 @@ class RandomIdle {
     auto& written = static_cast<SharedData<Number>&>(architecture_->resource("x"));
     while (!is_over_) {
       written.write.write(Number{2.0}, monotonic_now_ns() - (dice.once_in(2) ? us_to_ns(400) : 0));
-      sleep_for(dice.between(us_to_ns(50), ms_to_ns(1)));
+      sleep_for(dice.between(us_to_ns(10), us_to_ns(300)));
     }
   }
 
