@@ -372,6 +372,8 @@ class Control:
                 expected_revision=expected_revision,
                 commit_timeout_ns=_timeout_ns(request),
                 force=request.force,
+                idle=request.idle,
+                idle_within_ns=round((request.idle_within_s or DEFAULT_TIMEOUT_S) * 1e9),
             )
         except MauveError as error:
             if error_code(error) in _CALLED_OFF:
