@@ -30,11 +30,13 @@ def bounds_during(
     *,
     known: Mapping[str, Bound] | None = None,
     wakeup_ns: int = 0,
+    is_idle: bool = False,
 ) -> dict[str, Bound]:
     """The bound of each of `subjects_during`, whenever the change comes.
 
     `known`: bounds before the change; those on CPUs that it does not touch stay.
     `wakeup_ns`: how long after its instant a thread begins at the latest, on this computer.
+    `is_idle`: as for `times_during`.
     """
     olds, news = _by_name(before), _by_name(after)
     times: dict[str, DigraphTimes] = {}
@@ -58,7 +60,7 @@ def bounds_during(
             )
             for subject in here
         ]
-        found = times_during(members)
+        found = times_during(members, is_idle=is_idle)
         times |= {subject.name: found[subject.name] for subject in here if subject.machine.is_component}
     for subject in subjects:
         if subject.machine.is_component and subject.name not in bounds:

@@ -15,6 +15,9 @@ from mauve_rt.analysis.time_limit import optional_part
 from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text, missing_of
 
 
+AT_AN_IDLE_INSTANT = "at an idle instant"
+
+
 @dataclass(frozen=True)
 class Study:
     """What is known of an architecture."""
@@ -84,18 +87,36 @@ def study(
     return Study(subjects, bounds, verdict, unknown)
 
 
-def study_of_change(before: Study, after: Study, handovers: Handovers, surroundings: Surroundings) -> Study:
+def study_of_change(
+    before: Study, after: Study, handovers: Handovers, surroundings: Surroundings, *, is_idle: bool = False
+) -> Study:
     """What holds while the change from the one to the other is made, whenever that is.
 
-    `handovers`: of components that get a new core.
+    Args:
+        before: the architecture before the change.
+        after: the architecture after it.
+        handovers: of components that get a new core.
+        surroundings: what runs beside them.
+        is_idle: the change is made only while no job of a participant is pending.
+
     """
     subjects = subjects_during(before.subjects, after.subjects, handovers)
     wakeup_ns = surroundings.wakeup_ns
     bounds = bounds_during(
-        subjects, before.subjects, after.subjects, handovers, known=before.bounds, wakeup_ns=wakeup_ns
+        subjects,
+        before.subjects,
+        after.subjects,
+        handovers,
+        known=before.bounds,
+        wakeup_ns=wakeup_ns,
+        is_idle=is_idle,
     )
     verdict = judge(subjects, bounds, unknown=before.unknown, measured=surroundings.measured, searches=False)
     joined = Study(subjects, bounds, verdict, before.unknown)
+    if is_idle:
+        return replace(
+            joined, verdict=replace(verdict, why=f"{verdict.why}, with the change {AT_AN_IDLE_INSTANT}")
+        )
     if found := _run_during(before, after, joined, handovers, wakeup_ns):
         joined = replace(joined, verdict=found)
     return joined

@@ -28,6 +28,8 @@ class Plan(NamedTuple):
     """In words: `with rule link_lost`; empty: the change that the user names."""
     during: Study
     after: Study
+    is_idle: bool = False
+    """Whether it has to be made at an idle instant."""
 
 
 class Planner:
@@ -88,7 +90,8 @@ class Planner:
             ArchitectureFileError: the executor would refuse a step.
 
         """
-        return self._by_steps(f"when rule {rule.name} acts", path, Change(steps=list(rule.do)))
+        change = Change(steps=list(rule.do))
+        return self._by_steps(f"when rule {rule.name} acts", path, change, awaits_idle=False)
 
     def alternatives(self) -> Iterator[Plan]:
         """Of each core that the file names as an alternative or a fallback.
@@ -104,13 +107,23 @@ class Planner:
             for core in dict.fromkeys([*cores, *([part.fallback] if part.fallback else [])]):
                 kind = "fallback" if core == part.fallback else "alternative"
                 change = Change(steps=[Step("replace_core", name, core)])
-                yield self._by_steps(f"with {kind} {core} of {name}", self._model.path, change)
+                awaits_idle = kind == "alternative"  # a fallback comes when a component faults
+                words = f"with {kind} {core} of {name}"
+                yield self._by_steps(words, self._model.path, change, awaits_idle=awaits_idle)
 
-    def _by_steps(self, words: str, path: Path, change: Change) -> Plan:
-        return self._judged(words, _by_steps(change, path, self._model, self._components))
+    def _by_steps(self, words: str, path: Path, change: Change, *, awaits_idle: bool = True) -> Plan:
+        after = _by_steps(change, path, self._model, self._components)
+        return self._judged(words, after, is_idle=change.idle, awaits_idle=awaits_idle)
 
-    def _judged(self, words: str, after: "_After") -> Plan:
-        return Plan(words, *judged_change(self._now, self._surroundings, *after))
+    def _judged(
+        self, words: str, after: "_After", *, is_idle: bool = False, awaits_idle: bool = True
+    ) -> Plan:
+        """`awaits_idle`: an executor that requires schedulable changes makes it at an idle instant, if needed."""
+        awaits_idle &= self._model.executor.require_schedulable is True
+        judged = judged_change(
+            self._now, self._surroundings, *after, is_idle=is_idle, awaits_idle=awaits_idle
+        )
+        return Plan(words, *judged)
 
 
 _After = tuple[list[Machine], ThreadList, Handovers]

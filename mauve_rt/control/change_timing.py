@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.analysis.machines import ExecutionTime, Machine, State
 from mauve_rt.analysis.plan import Handovers
-from mauve_rt.analysis.study import Study, Surroundings, study, study_of_change
+from mauve_rt.analysis.study import AT_AN_IDLE_INSTANT, Study, Surroundings, study, study_of_change
+from mauve_rt.analysis.verdict import Outcome
 from mauve_rt.model.schema import ComponentModel
 from mauve_rt.model.steps import Step
 from mauve_rt.model.threads import ThreadList
@@ -24,6 +25,8 @@ class JudgedChange(NamedTuple):
 
     during: Study
     after: Study
+    is_idle: bool = False
+    """Whether it has to be made at an idle instant."""
 
 
 def judged_change(
@@ -32,11 +35,31 @@ def judged_change(
     machines: list[Machine],
     threads: ThreadList,
     handovers: Handovers,
+    *,
+    is_idle: bool = False,
+    awaits_idle: bool = False,
 ) -> JudgedChange:
-    """The studies of a change to these components and threads."""
+    """The studies of a change to these components and threads.
+
+    `is_idle`: it is made at an idle instant. `awaits_idle`: it will be, where the verdict needs that.
+    """
     changed = replace(surroundings, threads=replace(surroundings.threads, tasks=threads.tasks))
     after = study(machines, changed)
-    return JudgedChange(study_of_change(now, after, handovers, changed), after)
+    plain = None if is_idle else study_of_change(now, after, handovers, changed)
+    if plain is not None and (is_proved(plain) or not is_proved(after)):
+        return JudgedChange(plain, after)
+    idle = study_of_change(now, after, handovers, changed, is_idle=True)
+    if plain is None or (awaits_idle and is_proved(idle)):
+        return JudgedChange(idle, after, is_idle=True)
+    if is_proved(idle):
+        why = f"{plain.verdict.why}; {AT_AN_IDLE_INSTANT} (idle: true): {idle.verdict.outcome}"
+        plain = replace(plain, verdict=replace(plain.verdict, why=why))
+    return JudgedChange(plain, after)
+
+
+def is_proved(one: Study) -> bool:
+    """Whether each component meets its deadline, if declared or measured times hold."""
+    return one.verdict.outcome in (Outcome.SCHEDULABLE, Outcome.FORECAST)
 
 
 def handovers_of(steps: Iterable[Step], cores: Mapping[str, str], registry: PluginRegistry) -> Handovers:

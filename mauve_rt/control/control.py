@@ -287,7 +287,9 @@ class Control:
                 return self._start_or_stop(step, request, expected_revision=expected_revision)
         judged = self._judged(request, request.steps)
         with self._bound(plan.bound, dry_run=request.dry_run):
-            committed = self._commit(plan.transaction, request, expected_revision=expected_revision)
+            committed = self._commit(
+                plan.transaction, _as_judged(request, judged), expected_revision=expected_revision
+            )
         if request.dry_run:
             judged.require()
             words = "; ".join(str(step) for step in request.steps)
@@ -450,6 +452,11 @@ _NOTHING_NOW = {
     True: "nothing is to be done: it is so, or a rule of higher rank sets it",
     False: "it is in force once the rules that set it have ended",
 }
+
+
+def _as_judged(request: Request, judged: Judged) -> Request:
+    """At an idle instant, where the verdict needs that."""
+    return replace(request, idle=request.idle or judged.is_idle)
 
 
 def _warned(outcome: Outcome, judged: Judged) -> Outcome:

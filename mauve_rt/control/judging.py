@@ -30,6 +30,8 @@ class Judged:
     objection: str = ""
     """What speaks against the change; empty: it is schedulable, or asks for no more than there is."""
     is_refused: bool = False
+    is_idle: bool = False
+    """Whether it has to be made at an idle instant."""
 
     def require(self) -> None:
         """Before the change.
@@ -77,13 +79,25 @@ class Judge:
             return Judged()
         if protects(steps) and not request.dry_run:
             return Judged()
-        judged = self.of_steps(steps, always=request.dry_run)
+        judged = self.of_steps(
+            steps, always=request.dry_run, is_idle=request.idle, awaits_idle=self.requirement is True
+        )
         if protects(steps):
             return Judged(judged.verdicts)
         return replace(judged, is_refused=bool(judged.objection) and self.requirement is True)
 
-    def of_steps(self, steps: Sequence[Step], *, always: bool = True) -> Judged:
-        """The verdicts on steps that the executor accepts; unless `always`, none where no demand grows."""
+    def of_steps(
+        self,
+        steps: Sequence[Step],
+        *,
+        always: bool = True,
+        is_idle: bool = False,
+        awaits_idle: bool = False,
+    ) -> Judged:
+        """The verdicts on steps that the executor accepts; unless `always`, none where no demand grows.
+
+        `is_idle` and `awaits_idle`: as for `judged_change`.
+        """
         from mauve_rt.analysis.errors import AnalysisError  # noqa: PLC0415 - only where it is asked for
         from mauve_rt.analysis.time_limit import NoVerdictError  # noqa: PLC0415
         from mauve_rt.control.timing import VERDICT_NS, Timing  # noqa: PLC0415
@@ -91,7 +105,7 @@ class Judge:
         if self._timing is None:
             self._timing = Timing(self._runtime, uses=self._uses, others=self._others)
         try:
-            found = self._timing.of_change(steps, always=always)
+            found = self._timing.of_change(steps, always=always, is_idle=is_idle, awaits_idle=awaits_idle)
         except NoVerdictError:
             return _not_proved(f"no verdict within {VERDICT_NS / 1e6:.0f} ms of CPU time")
         except (AnalysisError, MauveError) as error:
@@ -100,7 +114,8 @@ class Judge:
             return Judged()
         studies = (found.now, found.judged.during, found.judged.after)
         objections = [] if found.lowers_demand else [*_objections(studies)]
-        return Judged(tuple(map(_verdict, studies)), next(iter(objections), ""))
+        verdicts = tuple(map(_verdict, studies))
+        return Judged(verdicts, next(iter(objections), ""), is_idle=found.judged.is_idle)
 
 
 class NotSchedulableError(ArchitectureFileError):

@@ -76,8 +76,17 @@ class Timing:
         has_bounds = any(state.limit_ns for machine in components for state in machine.states)
         return threads_of(self._runtime, components, uses, has_bounds=has_bounds, others=others)
 
-    def of_change(self, steps: Sequence[Step], *, always: bool = True) -> "TimedChange | None":
+    def of_change(
+        self,
+        steps: Sequence[Step],
+        *,
+        always: bool = True,
+        is_idle: bool = False,
+        awaits_idle: bool = False,
+    ) -> "TimedChange | None":
         """What steps do that the executor accepts; unless `always`, None where no demand grows.
+
+        `is_idle` and `awaits_idle`: as for `judged_change`.
 
         Raises:
             NoVerdictError: the verdicts would take longer than VERDICT_NS.
@@ -98,7 +107,15 @@ class Timing:
             # Threads that are no component's stay; those of removed components end.
             others = [each for each in self._others() if not is_named(each.name, known)]
             threads = self._threads(machines, changed.uses, others)
-            judged = judged_change(now.study, now.surroundings, machines, threads, handovers)
+            judged = judged_change(
+                now.study,
+                now.surroundings,
+                machines,
+                threads,
+                handovers,
+                is_idle=is_idle,
+                awaits_idle=awaits_idle,
+            )
         return TimedChange(now.study, judged, lowers_demand=lowers)
 
 
