@@ -10,17 +10,18 @@ Before, a participant's new core adopts the state of the old one, and at x takes
 
 A change at an idle instant finds no job of a participant pending, nor one of a component above the lowest
 participant. No busy window of these has T in it: it has the demand before the change or that after it, each
-with the handover. Components below the lowest participant, or with its priority, may have any window.
+with the handover. Components below the lowest participant, or with its priority, may have any window; but
+what a participant did before the change in it is done at the change, so it is no longer than x.
 
 Sources: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively scheduled systems", RTSS 1992, for
 one instant instead of a request for each task; Tindell, Alonso, "A very simple protocol for mode changes in
 priority preemptive systems", 1996, for the idle instant.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from itertools import takewhile
+from itertools import pairwise, takewhile
 
 from mauve_rt.analysis.blocking import blocking_ns
 from mauve_rt.analysis.critical_section import CriticalSection
@@ -41,6 +42,7 @@ from mauve_rt.analysis.machines import FOREVER_NS
 from mauve_rt.analysis.time_limit import check_time_limit
 
 _NOTHING = DigraphTask("", ())
+_INTERVALS = 32
 
 
 @dataclass(frozen=True)
@@ -94,13 +96,20 @@ def times_during(members: Sequence[Member], *, is_idle: bool = False) -> dict[st
     """
     merged = {_name(one): one.merged if isinstance(one, Participant) else one for one in members}
     jitter_ns = max((one.jitter_ns for one in merged.values()), default=0)
-    mixes = {_name(one): _Mix(one, jitter_ns) for one in members}
+    mixes = {_name(one): _Mix(one, jitter_ns, is_idle=is_idle) for one in members}
     loads = {_name(one): _loads(one) for one in members}
     apart = _without_window_over_change(members) if is_idle else frozenset()
-    return {
-        name: _times(name, merged, mixes, loads, jitter_ns, has_change_in_window=name not in apart)
-        for name in merged
-    }
+
+    def instants(name: str) -> _Instants:
+        if name in apart:
+            return lambda _changed, _window_ns: [0, FOREVER_NS]
+        return _some_instants if is_idle else _instants
+
+    return {name: _times(name, merged, mixes, loads, jitter_ns, instants=instants(name)) for name in merged}
+
+
+_Instants = Callable[["Sequence[_Mix]", int], Iterable[int]]
+"""Instants of the change to try: of those that change, and the longest window before the change."""
 
 
 def _without_window_over_change(members: Sequence[Member]) -> frozenset[str]:
@@ -124,7 +133,7 @@ def _times(
     loads: Mapping[str, tuple[Fraction, Fraction]],
     jitter_ns: int,
     *,
-    has_change_in_window: bool,
+    instants: "_Instants",
 ) -> DigraphTimes:
     check_time_limit()
     own, components = merged[name], [*merged.values()]
@@ -139,7 +148,7 @@ def _times(
     )
     try:
         level = [mixes[each] for each in (name, *higher, *equal)]
-        return _worst(level, delay, jitter_ns, has_change_in_window=has_change_in_window)
+        return _worst(level, delay, jitter_ns, instants)
     except UnboundedError as error:
         return DigraphTimes(reason=str(error), blocking_ns=blocked_ns)
 
@@ -157,29 +166,25 @@ def _task(member: Member, *, is_new: bool) -> DigraphTask:
     return _NOTHING if part is None else part.task
 
 
-def _worst(
-    mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int, *, has_change_in_window: bool
-) -> DigraphTimes:
+def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int, instants: "_Instants") -> DigraphTimes:
     """The longest of each job of the first one, over all instants of the change."""
     own, works = mixes[0], _together(mixes)
 
-    def window_at_ns(change_ns: int) -> int:
+    def window_at_ns(change_ns: int, latest_ns: int = FOREVER_NS) -> int:
         for mix in mixes:
-            mix.change_at(change_ns)
+            mix.change_at(change_ns, latest_ns)
         return window_ns(works, delay.blocking_ns)
 
     before_ns = window_at_ns(FOREVER_NS)
     longest: dict[Job, int] = {}
     walls: dict[str, int] = {}
     changed = [mix for mix in mixes if mix.is_changed]
-    for change_ns in _instants(changed) if has_change_in_window else (0, FOREVER_NS):
-        for path in own.jobs_until(window_at_ns(change_ns) + jitter_ns):
+    for change_ns, next_ns in pairwise((*instants(changed, before_ns + jitter_ns), FOREVER_NS)):
+        for path in own.jobs_until(window_at_ns(change_ns, next_ns - 1) + jitter_ns):
             response_ns = delay.finish_ns(path) - (path.release_ns - jitter_ns)
             longest[path.job] = max(response_ns, longest.get(path.job, 0))
         for name, cost_ns in own.states:
             walls[name] = max(delay.wall_ns(cost_ns), walls.get(name, 0))
-        if change_ns > before_ns + jitter_ns:  # after the window
-            break
     jobs = tuple(JobTime(job, response_ns) for job, response_ns in longest.items())
     return DigraphTimes(jobs, blocking_ns=delay.blocking_ns, walls_ns=walls)
 
@@ -190,12 +195,12 @@ def _together(mixes: "Sequence[_Mix]") -> list[Work]:
     return [*(mix for mix in mixes if mix.is_changed), *([Together(others)] if others else [])]
 
 
-def _instants(mixes: "Sequence[_Mix]") -> Iterator[int]:
+def _instants(changed: "Sequence[_Mix]", window_ns: int) -> Iterator[int]:
     """Of the change, after the begin of the window: at it, and right after each release of an old job."""
     yield 0
     last_ns, steps = 0, 0
-    while True:
-        following = min((mix.old_release_from(last_ns) for mix in mixes), default=FOREVER_NS)
+    while last_ns <= window_ns:
+        following = min((mix.old_release_from(last_ns) for mix in changed), default=FOREVER_NS)
         if following >= FOREVER_NS:
             return
         if (steps := steps + 1) > MOST_STEPS:
@@ -204,14 +209,21 @@ def _instants(mixes: "Sequence[_Mix]") -> Iterator[int]:
         yield last_ns
 
 
+def _some_instants(changed: "Sequence[_Mix]", window_ns: int) -> list[int]:
+    """Begins of intervals in which an idle instant may lie: the shorter, the less is too much."""
+    parts = range(0, window_ns, max(1, window_ns // _INTERVALS))
+    return sorted({*_instants(changed, window_ns), *parts})
+
+
 class _Mix:
     """What a component asks for in a window, where the change is so long after the begin of the window.
 
     Instants are nominal, and the window begins `jitter_ns` after 0: releases come up to so late.
     """
 
-    def __init__(self, member: Member, jitter_ns: int) -> None:
-        self.change_ns = FOREVER_NS
+    def __init__(self, member: Member, jitter_ns: int, *, is_idle: bool) -> None:
+        self.change_ns = self._most_before_ns = FOREVER_NS
+        self._is_idle = is_idle
         self._jitter_ns = jitter_ns
         self.is_changed = isinstance(member, Participant)
         self._old_task = _task(member, is_new=False)
@@ -226,9 +238,10 @@ class _Mix:
         self._switches: list[tuple[int, int]] = []
         self._switches_at: dict[int, list[tuple[int, int]]] = {}
 
-    def change_at(self, change_ns: int) -> None:
-        """From now on the answers are for this instant."""
+    def change_at(self, change_ns: int, latest_ns: int) -> None:
+        """From now on the answers are for this instant, of an idle one for all in between."""
         self.change_ns = change_ns
+        self._most_before_ns = latest_ns if self._is_idle and self.is_changed else FOREVER_NS
         if not self.is_changed or change_ns == FOREVER_NS:
             self._switches = []
             return
@@ -246,11 +259,12 @@ class _Mix:
         if length_ns <= 0:
             return 0
         until_ns = length_ns + self._jitter_ns
-        work_ns = self._old.in_ns(min(until_ns, self.change_ns))
+        work_ns = min(self._old.in_ns(min(until_ns, self.change_ns)), self._most_before_ns)
         for release_ns, before_ns in self._switches:
             if release_ns >= until_ns:
                 break
-            work_ns = max(work_ns, before_ns + self._new.in_ns(until_ns - release_ns))
+            done_ns = min(before_ns, self._most_before_ns)
+            work_ns = max(work_ns, done_ns + self._new.in_ns(until_ns - release_ns))
         return work_ns + self._handover_ns
 
     def until_ns(self, instant_ns: int) -> int:
@@ -265,7 +279,7 @@ class _Mix:
         for path in self._old_before(min(end_ns, self.change_ns)):
             yield path._replace(work_ns=path.work_ns + self._handover_ns)
         for release_ns, before_ns in self._switches:
-            work_ns = before_ns + self._handover_ns
+            work_ns = min(before_ns, self._most_before_ns) + self._handover_ns
             for path in paths(self._new_task):
                 if release_ns + path.release_ns >= end_ns:
                     break

@@ -14,7 +14,6 @@ from mauve_rt.analysis.threads import machines_of
 from mauve_rt.analysis.time_limit import optional_part
 from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text, missing_of
 
-
 AT_AN_IDLE_INSTANT = "at an idle instant"
 
 

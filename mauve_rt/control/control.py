@@ -334,7 +334,9 @@ class Control:
             # Before the commit: its verdict may come, and be looked at, before the commit returns.
             self._trials.update(dict.fromkeys(before, trial))
             committed = (
-                self._commit(transaction, request, expected_revision=expected_revision) if steps else None
+                self._commit(transaction, _as_judged(request, judged), expected_revision=expected_revision)
+                if steps
+                else None
             )
         except BaseException:
             self._trials.update(before)

@@ -81,7 +81,7 @@ def test_an_overload_after_the_change_is_said() -> None:
 
 
 def test_at_an_idle_instant_no_window_has_both() -> None:
-    """But for the component below the participants, whose own job may be under way then."""
+    """But for those of the component below the participants, whose own job may be under way then."""
     a = Participant(loop("a", 6, 16, 80), loop("a", 2, 16, 80), handover_ns=1)
     b = Participant(loop("b", 2, 16, 70), loop("b", 6, 16, 70))
     c, high = loop("c", 6, 48, 60), loop("high", 1, 48, 90)
@@ -89,6 +89,15 @@ def test_at_an_idle_instant_no_window_has_both() -> None:
     always = responses([a, b, c, high])
     assert found == {"high": 1, "a": 8, "b": 10, "c": always["c"]}
     assert always["b"] == 13
+
+
+def test_what_participants_did_before_an_idle_instant_is_done() -> None:
+    a = Participant(loop("a", 6, 16, 80), loop("a", 2, 16, 80))
+    b = Participant(loop("b", 2, 16, 70), loop("b", 6, 16, 70))
+    members = [a, b, loop("c", 6, 48, 60)]
+    assert responses(members)["c"] == 26
+    idle = times_during(members, is_idle=True)["c"].response_ns
+    assert idle == 5 + 6 + 6 + 2, "a is done 5 after the begin; then b, c and the next job of a"
 
 
 def test_one_with_the_priority_of_the_lowest_participant_may_be_under_way() -> None:
@@ -128,8 +137,13 @@ def random_members(random: Random, *, jitter: int) -> list[Member]:
     return members
 
 
-def one_run(random: Random, member: Member, change_ns: int, *, until: int, jitter: int) -> list[Release]:
-    """Old jobs released before the change, then new ones; the handover is part of the first new one."""
+def one_run(
+    random: Random, member: Member, change_ns: int, *, until: int, jitter: int, is_short: bool = False
+) -> list[Release]:
+    """Old jobs released before the change, then new ones; the handover is part of the first new one.
+
+    `is_short`: some old jobs take less than they may.
+    """
     is_changed = isinstance(member, Participant)
     old = member.old if is_changed else member
     new = member.new if is_changed else None
@@ -146,7 +160,8 @@ def one_run(random: Random, member: Member, change_ns: int, *, until: int, jitte
     if old is not None:
         job = random.choice(old.task.jobs)
         while nominal < (change_ns if is_changed else until):
-            release(job, 0)
+            cost_ns = job.cost_ns or 0
+            release(job, random.randint(min(1 - cost_ns, 0), 0) if is_short and random.random() < 0.5 else 0)
             job = random.choice(old.task.after(job))
     if new is not None:
         nominal = max(nominal, change_ns)
@@ -158,7 +173,7 @@ def one_run(random: Random, member: Member, change_ns: int, *, until: int, jitte
 
 
 def test_runs_find_that_only_the_begin_of_a_window_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "_instants", lambda _mixes: iter([0]))
+    monkeypatch.setattr(module, "_instants", lambda *_: iter([0]))
     with pytest.raises(AssertionError, match="seed"):
         test_no_run_with_a_change_is_above_its_bound(0)
 
@@ -194,7 +209,14 @@ def seeded_runs(
 ) -> dict[str, list[Release]]:
     """Of one seed the same until the change, whenever that is."""
     return {
-        name: one_run(Random(f"{seed} {name}"), one, change_ns, until=240, jitter=jitter)  # noqa: S311 - no secrets
+        name: one_run(
+            Random(f"{seed} {name}"),  # noqa: S311 - not for secrets
+            one,
+            change_ns,
+            until=240,
+            jitter=jitter,
+            is_short=True,
+        )
         for name, one in parts.items()
     }
 
