@@ -130,7 +130,9 @@ class Request:
         if self.reload is not None:
             return str(self.reload) + " (dry run)" * self.dry_run
         words = cut("; ".join(str(step) for step in self.steps), _LONGEST_WORDS)
-        return words + " at an idle instant" * self.idle + " by force" * self.force + " (dry run)" * self.dry_run
+        return (
+            words + " at an idle instant" * self.idle + " by force" * self.force + " (dry run)" * self.dry_run
+        )
 
     @property
     def is_direct(self) -> bool:
