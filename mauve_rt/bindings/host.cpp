@@ -360,8 +360,7 @@ Raises MauveError with the number of the failed step (`step`); nothing was chang
       .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
            py::arg("force") = false, py::arg("idle") = false, py::arg("idle_within_ns") = s_to_ns(1),
-           py::keep_alive<0, 1>(),
-           "As commit(), but waits for no release that follows: ask what it returns.")
+           py::keep_alive<0, 1>(), "As commit(), but waits for no release that follows: ask what it returns.")
       .def(
           "settle_probations", [](PyHost& self) { self.host().settle_probations(); }, Unlocked(),
           "Decides the probations whose time is over, and retires what they have put out.")

@@ -19,20 +19,20 @@ MIN_SPLIT_S, MAX_SPLIT_S = 1.0, 1e6
 MIN_SPLIT_BYTES = 100_000
 
 
+def _check_seconds(name: str, found_s: float, most_s: float) -> None:
+    if not math.isfinite(found_s) or not 0.0 <= found_s <= most_s:
+        text = f"bad {name}: expected 0 (the default) to {most_s:g} s, found {found_s:g}"
+        raise RefusalError(Code.INVALID, text)
+
+
 def check_form(request: Request) -> None:
     """Whether a request makes sense at all.
 
     Raises:
         RefusalError: INVALID.
     """
-    times = (
-        ("timeout", request.timeout_s, MAX_TIMEOUT_S),
-        ("idle_within_s", request.idle_within_s, LONGEST_IDLE_S),
-    )
-    for name, found_s, most_s in times:
-        if not math.isfinite(found_s) or not 0.0 <= found_s <= most_s:
-            text = f"bad {name}: expected 0 (the default) to {most_s:g} s, found {found_s:g}"
-            raise RefusalError(Code.INVALID, text)
+    _check_seconds("timeout", request.timeout_s, MAX_TIMEOUT_S)
+    _check_seconds("idle_within_s", request.idle_within_s, LONGEST_IDLE_S)
     if request.clock_ns < 0:
         text = f"bad clock_ns: expected 0 or an instant, found {request.clock_ns}"
         raise RefusalError(Code.INVALID, text)

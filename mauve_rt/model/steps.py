@@ -5,8 +5,8 @@
 - {kind: set_property, target: guidance, name: path_step, value: 0.5}
 - {kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}
 
-Or, where components whose state does not end are given up for it: {force: true, steps: [...]}. With `idle: true` the
-change is made while no job of a participant is pending.
+Or, where components whose state does not end are given up for it: {force: true, steps: [...]}.
+With `idle: true` the change is made while no job of a participant is pending.
 """
 
 import json
