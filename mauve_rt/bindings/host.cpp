@@ -91,20 +91,24 @@ class PyCommitted {
 };
 
 std::unique_ptr<PyCommitted> make(PyHost& self, const PyTransaction& steps, bool dry_run,
-                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns, bool force) {
+                                  std::uint64_t expected_revision, time_ns_t commit_timeout_ns, bool force,
+                                  bool idle, time_ns_t idle_within_ns) {
   Transaction transaction = steps.build(self.registry());
   const InterpreterUnlocked release;
   const TransactionOptions options{.timeouts = timeouts(commit_timeout_ns, 0),
                                    .dry_run = dry_run,
                                    .expected_revision = expected_revision,
-                                   .force = force};
+                                   .force = force,
+                                   .idle = idle,
+                                   .idle_within_ns = idle_within_ns};
   return std::make_unique<PyCommitted>(self.host().make(std::move(transaction), options));
 }
 
 TransactionReport commit(PyHost& self, const PyTransaction& steps, bool dry_run,
                          std::uint64_t expected_revision, time_ns_t commit_timeout_ns,
-                         time_ns_t phase_timeout_ns, bool force) {
-  const auto committed = make(self, steps, dry_run, expected_revision, commit_timeout_ns, force);
+                         time_ns_t phase_timeout_ns, bool force, bool idle, time_ns_t idle_within_ns) {
+  const auto committed =
+      make(self, steps, dry_run, expected_revision, commit_timeout_ns, force, idle, idle_within_ns);
   const InterpreterUnlocked release;
   return committed->report(dry_run ? 0 : phase_timeout_ns);
 }
@@ -333,7 +337,8 @@ Raises:
           py::arg("component"), Unlocked())
       .def("commit", &commit, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("force") = false,
+           py::arg("phase_timeout_ns") = s_to_ns(1), py::arg("force") = false, py::arg("idle") = false,
+           py::arg("idle_within_ns") = s_to_ns(1),
            R"(Carries out a transaction, deployed or not.
 
 It takes effect at one logical instant T: each component takes its change on its own thread, in its
@@ -346,11 +351,16 @@ the commit's time-out, is stopped by force, as stop() says. It stays FAULTED wha
 transaction. The commit is tried once more, without the thread of one that is removed or stopped; for
 new parts it is refused (faulted): remove the component and add it anew, in one transaction.
 
+With `idle`: the change is made at an instant at which no job of a participant is pending, so that no
+component executes with old parts after T. Where no such instant comes `idle_within_ns` after the last
+participant has agreed, the change is called off: timeout, and nothing is changed. In virtual time a
+request takes no time: the change is called off at once where a job is pending.
+
 Raises MauveError with the number of the failed step (`step`); nothing was changed then.)")
       .def("make", &make, py::arg("transaction"), py::kw_only(), py::arg("dry_run") = false,
            py::arg("expected_revision") = 0, py::arg("commit_timeout_ns") = s_to_ns(1),
-           py::arg("force") = false, py::keep_alive<0, 1>(),
-           "As commit(), but waits for no release that follows: ask what it returns.")
+           py::arg("force") = false, py::arg("idle") = false, py::arg("idle_within_ns") = s_to_ns(1),
+           py::keep_alive<0, 1>(), "As commit(), but waits for no release that follows: ask what it returns.")
       .def(
           "settle_probations", [](PyHost& self) { self.host().settle_probations(); }, Unlocked(),
           "Decides the probations whose time is over, and retires what they have put out.")

@@ -185,6 +185,8 @@ void bind_transaction(py::module_& module) {
       .def_readonly("blackout_ns", &TransactionReport::blackout_ns, "The longest of any component's.")
       .def_readonly("is_complete", &TransactionReport::is_complete,
                     "False: a release that follows has not come yet.")
+      .def_readonly("is_idle", &TransactionReport::is_idle,
+                    "It was made while no job of a participant was pending.")
       .def_readonly("instant_ns", &TransactionReport::instant_ns,
                     "T; NOT_MEASURED when the transaction changed no running component.");
   py::class_<ArchitectureDescription>(

@@ -87,6 +87,20 @@ def _add_force(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def _add_idle(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--idle",
+        action="store_true",
+        help="make the change while no job of a participant is pending, or refuse it",
+    )
+    parser.add_argument(
+        "--idle-within",
+        type=float,
+        metavar="S",
+        help="with --idle: seconds for such an instant to come, once all components have agreed (default 1)",
+    )
+
+
 def _add_over(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--over-rules",
@@ -189,6 +203,7 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     _add_record(parser)
     _add_timeout(parser)
     _add_force(parser)
+    _add_idle(parser)
     _add_phase_timeout(parser)
     _add_over_and_base(parser)
 
@@ -303,6 +318,8 @@ def _reconfigure(args: argparse.Namespace) -> int:
         dry_run=args.dry_run,
         commit_timeout_s=args.timeout,
         force=args.force or change.force,
+        idle=args.idle or change.idle,
+        idle_within_s=change.idle_within_s if args.idle_within is None else args.idle_within,
         **_over_of(args),
     )
 

@@ -7,7 +7,7 @@ from mauve_rt.control.requests import Code, RecordingOrder, RefusalError, Reload
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.model.steps import Step
+from mauve_rt.model.steps import LONGEST_IDLE_S, Step
 
 MAX_TIMEOUT_S = 10.0
 MAX_TEXT = 1000
@@ -19,15 +19,20 @@ MIN_SPLIT_S, MAX_SPLIT_S = 1.0, 1e6
 MIN_SPLIT_BYTES = 100_000
 
 
+def _check_seconds(name: str, found_s: float, most_s: float) -> None:
+    if not math.isfinite(found_s) or not 0.0 <= found_s <= most_s:
+        text = f"bad {name}: expected 0 (the default) to {most_s:g} s, found {found_s:g}"
+        raise RefusalError(Code.INVALID, text)
+
+
 def check_form(request: Request) -> None:
     """Whether a request makes sense at all.
 
     Raises:
         RefusalError: INVALID.
     """
-    if not math.isfinite(request.timeout_s) or not 0.0 <= request.timeout_s <= MAX_TIMEOUT_S:
-        text = f"bad timeout: expected 0 (the default) to {MAX_TIMEOUT_S:g} s, found {request.timeout_s:g}"
-        raise RefusalError(Code.INVALID, text)
+    _check_seconds("timeout", request.timeout_s, MAX_TIMEOUT_S)
+    _check_seconds("idle_within_s", request.idle_within_s, LONGEST_IDLE_S)
     if request.clock_ns < 0:
         text = f"bad clock_ns: expected 0 or an instant, found {request.clock_ns}"
         raise RefusalError(Code.INVALID, text)

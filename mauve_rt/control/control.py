@@ -283,7 +283,7 @@ class Control:
             for part in self._runtime.components():  # of this moment: a stop may just have begun
                 if part.name == step.target:
                     check_state(step, part)
-            if not request.dry_run:
+            if request.is_direct:
                 return self._start_or_stop(step, request, expected_revision=expected_revision)
         judged = self._judged(request, request.steps)
         with self._bound(plan.bound, dry_run=request.dry_run):
@@ -372,6 +372,8 @@ class Control:
                 expected_revision=expected_revision,
                 commit_timeout_ns=_timeout_ns(request),
                 force=request.force,
+                idle=request.idle,
+                idle_within_ns=round((request.idle_within_s or DEFAULT_TIMEOUT_S) * 1e9),
             )
         except MauveError as error:
             if error_code(error) in _CALLED_OFF:

@@ -35,7 +35,8 @@ def message_of(steps: tuple[Step, ...], measured: TransactionReport, done: str =
     """What was done, in one line, and which components are known to have missed releases for it."""
     # Every step of a component tells of all that it missed.
     missed = {report.component: report for report in measured.steps if report.missed_releases > 0}
-    return "; ".join([done or _done(steps, measured), *(_missed(report) for report in missed.values())])
+    idle = ["made while no job of a participant was pending"] * measured.is_idle
+    return "; ".join([done or _done(steps, measured), *idle, *map(_missed, missed.values())])
 
 
 def _missed(report: StepReport) -> str:

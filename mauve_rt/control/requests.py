@@ -121,6 +121,8 @@ class Request:
     force: bool = (
         False  # a component whose state does not end in time is given up: see Host.stop() and commit()
     )
+    idle: bool = False  # it is made while no job of a participant is pending: see Host.commit()
+    idle_within_s: float = 0.0  # 0: the default
     clock_ns: int = 0  # of a start: reference instant of the grid, 0: the deployment's
 
     def __str__(self) -> str:
@@ -129,12 +131,16 @@ class Request:
         if self.reload is not None:
             return str(self.reload) + " (dry run)" * self.dry_run
         words = cut("; ".join(str(step) for step in self.steps), _LONGEST_WORDS)
-        return words + " by force" * self.force + " (dry run)" * self.dry_run
+        return (
+            words + " at an idle instant" * self.idle + " by force" * self.force + " (dry run)" * self.dry_run
+        )
 
     @property
     def is_direct(self) -> bool:
         """Whether it is carried out without a transaction, beside whatever else there is."""
-        return len(self.steps) == 1 and self.steps[0].kind in ("start", "stop") and not self.dry_run
+        if self.dry_run or self.idle:
+            return False
+        return len(self.steps) == 1 and self.steps[0].kind in ("start", "stop")
 
     @property
     def author(self) -> str:

@@ -6,6 +6,7 @@
 - {kind: replace_core, target: exploration, name: mauve_examples/LocalExploration}
 
 Or, where components whose state does not end are given up for it: {force: true, steps: [...]}.
+With `idle: true` the change is made while no job of a participant is pending.
 """
 
 import json
@@ -16,7 +17,7 @@ from typing import Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, document, has, when
-from mauve_rt.file_schema.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Text
+from mauve_rt.file_schema.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Real, Text
 from mauve_rt.file_schema.schema_errors import expected
 from mauve_rt.file_schema.section import Section, setting
 from mauve_rt.file_schema.setting_words import sentence
@@ -27,6 +28,7 @@ from mauve_rt.model.step_kinds import STEP_KINDS, StepKind
 
 _SHOWN_VALUE = 60
 SHOWN_STEP = 300
+LONGEST_IDLE_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -120,9 +122,15 @@ ANY_STEPS = ListOf(_StepPart())  # or none
 
 
 class Change(Section):
-    """A transaction: its steps, and whether it gives up components whose state does not end."""
+    """A transaction: its steps, and how it is made."""
 
     force: bool = setting(Flag(), "give up components whose state does not end in time", default=False)
+    idle: bool = setting(Flag(), "make the change while no job of a participant is pending", default=False)
+    idle_within_s: float = setting(
+        Real(above=0, most=LONGEST_IDLE_S),
+        "with `idle`: time for such an instant to come, once all components have agreed",
+        default=1.0,
+    )
     steps: list[Step] = setting(STEPS, "the steps; all of them take effect, or none")
 
 

@@ -9,9 +9,10 @@ namespace mauve::model {
 namespace {
 
 constexpr const char* kSteps[] = {
-    "Waiting",    "Noticed", "Looked",        "Adopting",   "AdoptHung", "Voting",  "Counting",  "Closing",
-    "Publishing", "Looking", "Taking",        "Passing",    "Clearing",  "Raising", "Beginning", "Executing",
-    "Hung",       "Parking", "LookingParked", "CallingOff", "Parked",    "Claimed", "Ended"};
+    "Waiting",       "Noticed",     "Looked",       "Adopting",    "AdoptHung",  "Voting",  "Counting",
+    "Closing",       "IdleLooking", "IdleScanning", "IdleClosing", "Publishing", "Looking", "Taking",
+    "Passing",       "Clearing",    "Raising",      "Beginning",   "Executing",  "Hung",    "Parking",
+    "LookingParked", "CallingOff",  "Parked",       "Claimed",     "Ended"};
 constexpr const char* kRequests[] = {"Awaiting",  "UrgentCall",  "Locking",    "Posting",  "Notifying",
                                      "VotingFor", "CountingFor", "ClosingFor", "Deciding", "Retracting",
                                      "Waking",    "TakenFor",    "Passing",    "Answered", "Freed"};

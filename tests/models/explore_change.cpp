@@ -2,7 +2,7 @@
 // The long runs, by hand: explores one configuration and prints its figures.
 //
 //   explore_change [components=2] [changes=1] [last=4] [most=60000000] [twin=NUMBER] [OPTION...]
-//   options: stop shutdown hang lost refuse event skip remove moved_writer parked start start_by_change epoch urgent
+//   options: stop shutdown hang lost refuse event skip remove moved_writer parked start start_by_change epoch idle urgent
 // Build: ninja explore_change. Example: explore_change components=3 last=4 stop (7 million states, 15 seconds, 1 GB).
 #include <cstdio>
 #include <cstdlib>
@@ -22,7 +22,8 @@ int main(int argc, char** argv) {
       {"remove", &options.remove}, {"moved_writer", &options.moved_writer},
       {"parked", &options.parked}, {"start", &options.start},
       {"epoch", &options.epoch},   {"start_by_change", &options.start_by_change},
-      {"urgent", &options.urgent}, {"lost", &options.lost}};
+      {"urgent", &options.urgent}, {"lost", &options.lost},
+      {"idle", &options.idle}};
   const std::map<std::string, int*> numbers{{"components", &options.components},
                                             {"changes", &options.changes},
                                             {"last", &options.last_instant},

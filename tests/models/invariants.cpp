@@ -35,6 +35,7 @@ void Model::check_begin(const State& state, int i) {
       require(component.clock >= change.instant(), "an execution before T has new parts");
     } else {
       require(!is_made || component.clock < change.instant(), "an execution from T on has old parts");
+      require(!is_made || !options_.idle, "a job has old parts after the idle close");
     }
   }
   check_parts(state, i);
@@ -73,6 +74,16 @@ void Model::check_closed(const State& state, int k) {
   for (int i = 0; i < options_.components; ++i)
     require(!takes_part(k, i) || state.components[i].last < change.instant(),
             "T lies before an execution that had old parts");
+  for (int i = 0; i < options_.components && options_.idle; ++i) {
+    const Component& component = state.components[i];
+    const bool executes = component.step == Step::kBeginning || component.step == Step::kExecuting ||
+                          component.step == Step::kHung;
+    // An event that has not been released belongs to T, however old it is.
+    const bool has_instant =
+        !waits_for_events(i) && !component.is_parked() && component.clock <= options_.last_instant;
+    const bool is_due = has_instant && component.clock <= change.frontier();
+    require(!executes && !is_due, "a job is pending at T");
+  }
   require(!options_.epoch || epoch(change) > change.requested_at,
           "the new epoch was past when it was asked for");
   const bool is_second = options_.changes == 2 && state.earlier == 2 - k;

@@ -56,6 +56,7 @@ class Model {
   void adopt(State state, int i);
   void vote(State state, int i);
   void close(State state, int i);
+  void close_if_idle(State state, int i);
   void look(State state, int i);
   void take(State state, int i);
   void clear(State state, int i);
@@ -65,6 +66,7 @@ class Model {
   void call_off(State state, int i);
   void come_back(State state, int i);
   Step after_decision() const;
+  bool has_job_at(const State& state, int i, int frontier) const;
   void take_parts(State& state, int i, int change);
 
   // requester.cpp

@@ -38,6 +38,12 @@ enum class Twin {
   kEpochWithoutRaise,
   kEpochOfEachOne,
   kUrgentWithoutLock,
+  // Weakened checked closes.
+  kDuesBeforeCut,
+  kDueMovesAtRelease,
+  kEventWritesNothing,
+  kClosesWithoutLook,
+  kEventKeepsItsClock,
 };
 
 struct Options {
@@ -59,6 +65,7 @@ struct Options {
   bool start{false};   // a command may start the parked component
   bool start_by_change{false};  // the change starts the parked component
   bool epoch{false};            // the change moves the epoch
+  bool idle{false};             // the change is made while no job of a participant is pending
   bool urgent{false};           // the second change calls off the first one while that one is open
 
   Twin twin{Twin::kNone};

@@ -25,6 +25,10 @@ void Model::step_component(const State& from, int i) {
     case Step::kClosing:
     case Step::kPublishing:
       return close(from, i);
+    case Step::kIdleLooking:
+    case Step::kIdleScanning:
+    case Step::kIdleClosing:
+      return close_if_idle(from, i);
     case Step::kLooking:
       return look(from, i);
     case Step::kTaking:
@@ -82,7 +86,9 @@ void Model::notice(State state, int i) {
   }
   if (component.slot != Slot::kPosted) return go(state, i, Step::kWaiting);
   component.slot = Slot::kBusy;
-  go(state, i, component.voted ? Step::kLooking : Step::kAdopting);
+  if (!component.voted) return go(state, i, Step::kAdopting);
+  const bool looks = options_.idle && state.changes[component.slot_change].to_vote == 0;
+  go(state, i, looks ? Step::kIdleLooking : Step::kLooking);
 }
 
 /// A release, before the guards of the wait are tested.
@@ -109,7 +115,43 @@ void Model::vote(State state, int i) {
   }
   component.voted = true;
   const bool is_last = --state.changes[change].to_vote == 0;
-  go(state, i, is_last ? Step::kClosing : Step::kLooking);
+  const bool looks = options_.idle && !is(Twin::kClosesWithoutLook);
+  go(state, i, !is_last ? Step::kLooking : looks ? Step::kIdleLooking : Step::kClosing);
+}
+
+/// What a component tells of itself: a pending instant in a wait, until it begins to execute; the next one when it waits again.
+bool Model::has_job_at(const State& state, int i, int frontier) const {
+  const Component& component = state.components[i];
+  if (component.is_parked() || component.step == Step::kClaimed || component.step == Step::kEnded)
+    return false;
+  const bool executes = component.step == Step::kBeginning || component.step == Step::kExecuting ||
+                        component.step == Step::kHung;
+  if (executes && is(Twin::kDueMovesAtRelease)) return component.clock + kPeriod[i] <= frontier;
+  if (executes) return true;
+  const bool has_instant = component.clock != 0 && component.clock <= options_.last_instant;
+  return has_instant && component.clock <= frontier;
+}
+
+/// One step for the look at the cut, one for each participant, one for the close.
+void Model::close_if_idle(State state, int i) {
+  Component& component = state.components[i];
+  const int k = component.slot_change;
+  if (component.step == Step::kIdleLooking) {
+    component.seen = state.changes[k].word, component.at = 0;
+    return go(state, i, CutWord{component.seen}.is_open() ? Step::kIdleScanning : Step::kLooking);
+  }
+  if (component.step == Step::kIdleScanning) {
+    const bool is_idle =
+        !has_job_at(state, component.at, static_cast<int>(CutWord{component.seen}.frontier_ns()));
+    if (is_idle && ++component.at < options_.components) return go(state, i, Step::kIdleScanning);
+    component.at = 0;
+    return go(state, i, is_idle ? Step::kIdleClosing : Step::kLooking);
+  }
+  const CutWord seen{is(Twin::kDuesBeforeCut) ? state.changes[k].word : component.seen};
+  const bool is_closed = seen.is_open() && call_cut(state, k, [&](auto& cut) { return cut.close_if(seen); });
+  component.seen = 0;
+  if (is_closed) check_closed(state, k);
+  go(state, i, Step::kLooking);
 }
 
 void Model::close(State state, int i) {
@@ -138,7 +180,7 @@ void Model::look(State state, int i) {
   if (seen.is_off()) return go(state, i, Step::kClearing);
   const bool has_pending_clock = !waits_for_events(i) && component.clock <= options_.last_instant;
   const bool has_reached =
-      !has_pending_clock || component.clock >= seen.instant_ns() || is(Twin::kTakeAtOnce);
+      !has_pending_clock || component.clock >= seen.instant_ns() || options_.idle || is(Twin::kTakeAtOnce);
   if (seen.is_closed() && has_reached) return go(state, i, after_decision());
   require(!seen.is_closed() || options_.components > 1,
           "a single participant does not take in the visit in which it closes");
@@ -175,6 +217,8 @@ void Model::take_parts(State& state, int i, int change) {
   if (options_.moved_writer && i == 1 && !is(Twin::kNoFloor)) state.has_floor = true;
   if (!is(Twin::kTakeDoesNotRaise))
     component.entered = static_cast<std::uint8_t>(std::max<int>(component.entered, taken.frontier()));
+  if (options_.idle && waits_for_events(i) && component.clock != 0)
+    component.clock = static_cast<std::uint8_t>(std::max<int>(component.clock, taken.instant()));
   if (!options_.epoch || waits_for_events(i)) return;
   const int start = is(Twin::kEpochOfEachOne) ? state.now + 1 : epoch(taken);
   component.clock = static_cast<std::uint8_t>(std::min(start, options_.last_instant + 1));
@@ -197,10 +241,15 @@ void Model::clear(State state, int i) {
 void Model::raise(State state, int i) {
   Component& component = state.components[i];
   const bool raises = !is(Twin::kReleaseDoesNotRaise) && !is(Twin::kChooseThenPublish);
-  const CutWord seen = call_cut(state, component.slot_change,
-                                [&](auto& cut) { return raises ? cut.raise(component.clock) : cut.look(); });
+  const bool raises_always = options_.idle && waits_for_events(i) && !is(Twin::kEventWritesNothing);
+  const CutWord seen = call_cut(state, component.slot_change, [&](auto& cut) {
+    if (!raises) return cut.look();
+    return raises_always ? cut.raise_always(component.clock) : cut.raise(component.clock);
+  });
   if (seen.is_off()) return go(state, i, Step::kClearing);
-  if (seen.is_closed() && component.clock >= seen.instant_ns()) return go(state, i, after_decision());
+  const bool has_reached =
+      component.clock >= seen.instant_ns() || (options_.idle && !is(Twin::kEventKeepsItsClock));
+  if (seen.is_closed() && has_reached) return go(state, i, after_decision());
   component.slot = Slot::kPosted, component.after = After::kWait;
   go(state, i, Step::kBeginning);
 }

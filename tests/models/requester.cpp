@@ -146,7 +146,8 @@ void Model::vote_for(State state, int k) {
     change.step = Request::kCountingFor;
     return emit(state);
   }
-  if (change.step == Request::kCountingFor && --change.to_vote == 0) {
+  // An idle one is closed by a participant that runs.
+  if (change.step == Request::kCountingFor && --change.to_vote == 0 && !options_.idle) {
     change.step = Request::kClosingFor;
     return emit(state);
   }

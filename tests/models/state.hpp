@@ -13,21 +13,24 @@ inline constexpr int kMostComponents = 3, kMostChanges = 2;
 
 /// What a component's thread does next. Each is one atomic operation on a shared word.
 enum class Step : std::uint8_t {
-  kWaiting,     // wakes up when it is notified, or for a release
-  kNoticed,     // has taken the notice, is about to look at its slot
-  kLooked,      // of a twin only: has found its slot empty, is about to take the notice
-  kAdopting,    // runs the adopt of its core
-  kAdoptHung,   // an adopt that does not end
-  kVoting,      // raises the cut by its last clock
-  kCounting,    // counts its vote
-  kClosing,     // has counted the last vote
-  kPublishing,  // of a twin only: has chosen T, has not published it
-  kLooking,     // looks at the cut, in its wait
-  kTaking,      // puts the new parts in
-  kPassing,     // counts that it has taken
-  kClearing,    // empties its slot
-  kRaising,     // raises the cut by the clock of its release
-  kBeginning,   // begins an execution
+  kWaiting,       // wakes up when it is notified, or for a release
+  kNoticed,       // has taken the notice, is about to look at its slot
+  kLooked,        // of a twin only: has found its slot empty, is about to take the notice
+  kAdopting,      // runs the adopt of its core
+  kAdoptHung,     // an adopt that does not end
+  kVoting,        // raises the cut by its last clock
+  kCounting,      // counts its vote
+  kClosing,       // has counted the last vote
+  kIdleLooking,   // all have voted: looks at the cut, then at each participant
+  kIdleScanning,  // looks whether participant `at` has a job pending
+  kIdleClosing,   // closes the cut if it is the one that it saw
+  kPublishing,    // of a twin only: has chosen T, has not published it
+  kLooking,       // looks at the cut, in its wait
+  kTaking,        // puts the new parts in
+  kPassing,       // counts that it has taken
+  kClearing,      // empties its slot
+  kRaising,       // raises the cut by the clock of its release
+  kBeginning,     // begins an execution
   kExecuting,
   kHung,           // an execution that does not end
   kParking,        // is about to say that it is parked
@@ -74,6 +77,8 @@ struct Component {
   std::uint8_t last;     // ghost: the last clock that was executed
   std::uint8_t entered;  // by which a vote raises: the last clock executed, or T - 1 of the last change
   std::uint8_t chosen;   // of a twin only: a T that is not published
+  std::uint8_t seen;     // the bits of the cut that it looks for an idle instant at
+  std::uint8_t at;       // participant
   Slot slot;
   std::uint8_t slot_change;   // whose record, unless the slot is empty
   std::uint8_t mutex_holder;  // of the command mutex: 0, or 1 + change

@@ -58,6 +58,12 @@ INSTANTIATE_TEST_SUITE_P(
         Configuration{"EpochAndStart",
                       {.last_instant = 6, .parked = true, .start_by_change = true, .epoch = true},
                       10'000},
+        Configuration{"Idle", {.idle = true}, 50'000},
+        Configuration{"IdleOfThree", {.components = 3, .last_instant = 2, .idle = true}, 50'000},
+        Configuration{"IdleWithEventWait", {.last_instant = 3, .event = true, .idle = true}, 50'000},
+        Configuration{
+            "IdleWithStopAndHang", {.last_instant = 2, .stop = true, .hang = true, .idle = true}, 30'000},
+        Configuration{"IdleWithAParkedOne", {.parked = true, .start = true, .idle = true}, 10'000},
         Configuration{"TwoChanges", {.changes = 2, .last_instant = 1}, 50'000},
         Configuration{"UrgentChange", {.changes = 2, .last_instant = 1, .urgent = true}, 50'000},
         Configuration{"TwoChangesWithAParkedOne",
@@ -105,6 +111,23 @@ INSTANTIATE_TEST_SUITE_P(
         Weakening{"NoFloor",
                   {.moved_writer = true, .twin = Twin::kNoFloor},
                   "a late old value replaces a new one"}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+constexpr const char *kPending = "a job is pending at T",
+                     *kOldAfterClose = "a job has old parts after the idle close";
+
+INSTANTIATE_TEST_SUITE_P(
+    TwinOfTheCheckedClose, WeakenedChangeModel,
+    ::testing::Values(
+        Weakening{"DuesBeforeCut", {.idle = true, .twin = Twin::kDuesBeforeCut}, kPending},
+        Weakening{"DueMovesAtRelease", {.idle = true, .twin = Twin::kDueMovesAtRelease}, kPending},
+        Weakening{"EventWritesNothing",
+                  {.last_instant = 3, .event = true, .idle = true, .twin = Twin::kEventWritesNothing},
+                  kPending},
+        Weakening{"ClosesWithoutLook", {.idle = true, .twin = Twin::kClosesWithoutLook}, kPending},
+        Weakening{"EventKeepsItsClock",
+                  {.last_instant = 3, .event = true, .idle = true, .twin = Twin::kEventKeepsItsClock},
+                  kOldAfterClose}),
     [](const auto& info) { return std::string(info.param.name); });
 
 INSTANTIATE_TEST_SUITE_P(

@@ -24,6 +24,30 @@ TEST(Cut, RaiseNeverLowers) {
   EXPECT_TRUE(cut.look().is_open());
 }
 
+TEST(Cut, RaiseAlwaysGoesBeyondTheFrontier) {
+  Cut cut;
+  EXPECT_EQ(7, cut.raise_always(7).frontier_ns());
+  EXPECT_EQ(8, cut.raise_always(3).frontier_ns());
+  EXPECT_EQ(20, cut.raise_always(20).frontier_ns());
+  const CutWord closed = cut.close();
+  EXPECT_EQ(closed.bits, cut.raise_always(30).bits);
+}
+
+TEST(Cut, CloseIfClosesTheWordThatWasSeen) {
+  Cut cut;
+  const CutWord seen = cut.raise(7);
+  cut.raise_always(3);
+  EXPECT_FALSE(cut.close_if(seen)) << "it was raised since";
+  EXPECT_TRUE(cut.look().is_open());
+  EXPECT_TRUE(cut.close_if(cut.look()));
+  EXPECT_EQ(9, cut.look().instant_ns());
+  EXPECT_FALSE(cut.close_if(seen));
+  Cut other;
+  other.call_off();
+  EXPECT_FALSE(other.close_if(CutWord{}));
+  EXPECT_TRUE(other.look().is_off());
+}
+
 TEST(Cut, InstantIsTheClockAfterTheFrontier) {
   Cut cut;
   cut.raise(41);

@@ -2,6 +2,8 @@
 // The twins of mauve::Cut, and the call of the cut that a model's twin asks for: by default mauve::Cut itself.
 #pragma once
 
+#include <algorithm>
+
 #include "cut_call.hpp"
 #include "options.hpp"
 #include "state.hpp"
@@ -17,9 +19,15 @@ class WeakCut {
     if (word_.is_open() && word_.frontier_ns() < clock) word_ = CutWord::open_at(clock);
     return word_;
   }
+  CutWord raise_always(time_ns_t clock) { return raise(std::max(clock, word_.instant_ns())); }
   CutWord close() {
     if (word_.is_open()) word_.bits |= CutWord::kClosed;
     return word_;
+  }
+  bool close_if(CutWord seen) {
+    if (word_.bits != seen.bits) return false;
+    word_.bits |= CutWord::kClosed;
+    return true;
   }
   bool call_off() {
     if (!word_.is_open()) return false;

@@ -11,6 +11,7 @@
 #include "random_commands.hpp"
 #include "random_data.hpp"
 #include "random_ends.hpp"
+#include "random_idle.hpp"
 #include "random_rules.hpp"
 #include "random_words.hpp"
 
@@ -25,9 +26,10 @@ struct SeedScenario {
 inline constexpr std::array kScenarios = std::to_array<SeedScenario>({
     {"random_architecture", random_architecture, 10},
     {"random_bridge", random_bridge, 5},
-    {"random_commands", random_commands, 39},
+    {"random_commands", random_commands, 34},
     {"random_data", random_data, 4},
     {"random_ends", random_ends, 10},
+    {"random_idle", random_idle, 5},
     {"random_meetings", random_meetings, 25},
     {"random_rules", random_rules, 4},
     {"random_words", random_words, 3},

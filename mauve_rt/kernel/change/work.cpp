@@ -127,6 +127,10 @@ TransactionCommit::Work::Basis TransactionCommit::Work::prepare_for_later(Transa
     throw Error(ErrorCode::invalid_argument, "a prepared transaction stops nothing by force",
                 {.element = "force", .remedy = "commit it unprepared, or stop the component by force first"});
   }
+  if (options_.idle) {
+    throw Error(ErrorCode::invalid_argument, "a prepared transaction waits for no idle instant",
+                {.element = "idle", .remedy = "commit it unprepared, or leave `idle` out"});
+  }
   if (options_.dry_run || !deployed_) {
     throw Error(ErrorCode::not_configured, "a transaction is prepared for an architecture that is deployed",
                 {.remedy = "deploy it first; for a dry run ask for a commit"});
@@ -249,7 +253,9 @@ void TransactionCommit::Work::gather() {
   }
   for (const auto& repair : repairs_) actions.push_back(repair.get());
   std::vector<std::shared_ptr<Component>> touched;  // first: outlives the commit
-  auto commit = std::make_unique<Commit>(changes_.size(), std::move(actions));
+  const auto silent = options_.idle ? find_silent() : std::vector<std::shared_ptr<Component>>{};
+  auto commit = std::make_unique<Commit>(changes_.size() + silent.size(), std::move(actions));
+  if (options_.idle) commit->set_idle(options_.idle_within_ns);
   auto place = commit->participants().begin();
   for (Change& change : changes_) {
     change.place = &*place;
@@ -266,8 +272,14 @@ void TransactionCommit::Work::gather() {
     places_.insert_or_assign(change.draft->name(), &*place);
     ++place;
   }
-  touched.reserve(changes_.size());
+  touched.reserve(changes_.size() + silent.size());
   for (const Change& change : changes_) touched.push_back(change.draft->component);
+  for (const auto& component : silent) {
+    place->task = &component->task();
+    place->is_silent = true;
+    touched.push_back(component);
+    ++place;
+  }
   commit->assign_actions();
   prepare_publication();
   commit->set_publication(*this);
@@ -276,6 +288,40 @@ void TransactionCommit::Work::gather() {
   const LockGuard lock(facts_mutex_);
   commit_.swap(commit);
   touched_.swap(touched);
+}
+
+/// Of an idle change on several CPUs: the components that take no part, and stand at or above the priority of a participant that runs, on a
+/// CPU that both may run on. On one CPU there are none: the lowest participant closes.
+std::vector<std::shared_ptr<Component>> TransactionCommit::Work::find_silent() const {
+  std::vector<const TaskSettings*> running;
+  for (const Change& change : changes_) {
+    const Task& task = change.draft->component->task();
+    if (!task.is_parked()) running.push_back(&task.settings());
+  }
+  const auto is_pinned_with_first = [&running](const TaskSettings* each) {
+    return each->cpus.size() == 1 && each->cpus == running.front()->cpus;
+  };
+  if (std::all_of(running.begin(), running.end(), is_pinned_with_first)) return {};
+  const auto may_delay = [](const TaskSettings& upper, const TaskSettings& lower) {
+    const bool share_cpu = upper.cpus.empty() || lower.cpus.empty() ||
+                           std::find_first_of(upper.cpus.begin(), upper.cpus.end(), lower.cpus.begin(),
+                                              lower.cpus.end()) != upper.cpus.end();
+    return share_cpu && upper.priority >= lower.priority;
+  };
+  std::vector<std::shared_ptr<Component>> silent;
+  for (const auto& component : architecture_.components()) {
+    const Task& task = component->task();
+    // One that is FAULTED or STOPPING would call the change off; it starts nothing that a change does not start.
+    const bool may_run = task.state() == ComponentState::running || task.is_parked();
+    const bool takes_part = std::any_of(changes_.begin(), changes_.end(), [&](const Change& change) {
+      return change.draft->component == component;
+    });
+    if (!may_run || takes_part || task.state() == ComponentState::faulted) continue;
+    if (std::any_of(running.begin(), running.end(),
+                    [&](const TaskSettings* each) { return may_delay(task.settings(), *each); }))
+      silent.push_back(component);
+  }
+  return silent;
 }
 
 void TransactionCommit::Work::commit_by_force_if_asked() {
@@ -456,7 +502,8 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   TransactionReport report{.steps = reports_,
                            .revision = architecture_.revision(),
                            .prepare_ns = is_simulated_ ? 0 : prepare_ns_,
-                           .blackout_ns = 0};
+                           .blackout_ns = 0,
+                           .is_idle = committed_ && options_.idle};
   for (const auto& [name, place] : places_) {
     const bool is_open = !place->has_passed() || (!is_simulated_ && place->awaits_release());
     if (committed_ && is_open) report.is_complete = false;
@@ -467,6 +514,7 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
       std::find_if(steps.begin(), steps.end(), [](const auto& step) { return step->is_for_all(); });
   if (committed_ && for_all != steps.end()) {  // a line each, after those of the steps
     for (const auto& component : touched_) {
+      if (!places_.contains(component->name())) continue;  // it took part silently
       StepReport& line = report.steps.emplace_back();
       line.step = (*for_all)->text();
       line.component = component->name();

@@ -143,6 +143,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void prepare_listening(Change& change, const PortBase& port, ServiceBase* service);
   // commit
   void gather();
+  std::vector<std::shared_ptr<Component>> find_silent() const;
   void commit_by_force_if_asked();
   bool force_hung();
   bool stop_by_force(const Change& change);

@@ -49,6 +49,12 @@ void Commit::assign_actions() {
       std::adjacent_find(order_.begin(), order_.end(), [](const Participant* a, const Participant* b) {
         return a->task == b->task;
       }) == order_.end());
+  posted_ = order_;
+  if (is_idle_) {  // the lowest votes last: then its vote finds an idle instant, as a rule
+    std::stable_sort(posted_.begin(), posted_.end(), [](const Participant* a, const Participant* b) {
+      return a->task->settings().priority > b->task->settings().priority;
+    });
+  }
   for (CommitAction* action : actions_) {
     Participant* const own = action->task != nullptr ? find(*action->task) : nullptr;
     if (own != nullptr) own->actions.push_back(action);  // else a check, or of an added one that does not run
@@ -121,8 +127,35 @@ bool Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
   const std::uint32_t to_vote = to_vote_.fetch_sub(1, std::memory_order_acq_rel);
   MAUVE_EXPECTS(to_vote != 0);
   if (to_vote != 1) return false;
+  if (is_idle_) return close_if_idle(participant);
   cut_.close();
   return true;
+}
+
+/// Right because of its order: the cut is looked at first, then what each has pending, and the cut is closed only if it is still the word
+/// that was seen. A participant raises the cut before it executes, and what it has pending moves on only when it waits again. So one that
+/// executes an old job is seen pending, and one that began after the look has changed the word.
+bool Commit::close_if_idle(const Participant& by) noexcept {
+  // acquire: with the last vote all raises are seen
+  if (to_vote_.load(std::memory_order_acquire) != 0) return false;
+  const CutWord seen = cut_.look();
+  if (!seen.is_open()) return false;
+  const Participant* const pending = find_pending(seen);
+  pending_.store(pending, std::memory_order_relaxed);  // relaxed: for a message
+  if (pending != nullptr) return false;
+  const bool is_lowest =
+      is_one_cpu_ && by.in_flight && by.task->settings().priority == closer_->task->settings().priority;
+  if (is_lowest || !is_one_cpu_) return cut_.close_if(seen);
+  closer_->task->notify_commit();
+  return false;
+}
+
+/// One that was parked at the start of the commit has none: no start comes before the decision. Neither has one that was timed out.
+const Participant* Commit::find_pending(CutWord seen) const noexcept {
+  for (const Participant* participant : order_) {
+    if (participant->in_flight && participant->task->may_have_job_at(seen.frontier_ns())) return participant;
+  }
+  return nullptr;
 }
 
 time_ns_t Commit::take(Participant& participant) noexcept {
@@ -226,7 +259,7 @@ Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
   await_busy(until_ns);
   is_refused_ = refusal_state_.load(std::memory_order_acquire) == RefusalState::complete;
   if (is_refused_) return Outcome::refused;
-  return off() == Off::timed_out ? Outcome::timed_out : Outcome::off;
+  return off() == Off::timed_out || off() == Off::not_idle ? Outcome::timed_out : Outcome::off;
 }
 
 /// Nothing is held while a component has yet to take an earlier change. The gate does not know of this commit yet: a shutdown is
@@ -295,8 +328,23 @@ void Commit::begin() noexcept {
     takes_epoch |= participant->epoch_lead_ns != 0;
   }
   has_own_.store(has_own, std::memory_order_relaxed);
+  if (is_idle_) choose_closer();
   // A new epoch counts from T, and lies ahead of all that was executed by now.
   if (takes_epoch) cut_.raise(order_.front()->task->clock().now_ns());
+}
+
+bool Commit::is_one_cpu() const noexcept {
+  const std::vector<int>& cpus = closer_->task->settings().cpus;
+  return cpus.size() == 1 && std::all_of(order_.begin(), order_.end(), [&cpus](const Participant* each) {
+           return !each->in_flight || each->task->settings().cpus == cpus;
+         });
+}
+
+void Commit::choose_closer() noexcept {
+  for (const Participant* participant : posted_) {
+    if (participant->in_flight) closer_ = participant;  // the last one is the lowest
+  }
+  is_one_cpu_ = closer_ != nullptr && is_one_cpu();
 }
 
 bool Commit::check() noexcept {
@@ -319,7 +367,7 @@ void Commit::vote_for_parked() noexcept {
 }
 
 void Commit::post_all(time_ns_t until_ns) noexcept {
-  for (Participant* participant : order_) {
+  for (Participant* participant : posted_) {
     if (!participant->is_own) continue;
     if (!cut_.look().is_open()) return;
     if (participant->task->post(*participant, until_ns)) continue;
@@ -331,18 +379,25 @@ void Commit::post_all(time_ns_t until_ns) noexcept {
 
 /// In virtual time no thread comes: the requester's runs the components' steps of the change.
 void Commit::visit_simulated() noexcept {
-  for (Participant* participant : order_) {
+  for (Participant* participant : posted_) {
     if (participant->is_own && participant->task->is_simulated()) participant->task->visit_simulated();
   }
 }
 
 void Commit::await_decision(time_ns_t until_ns) noexcept {
   const bool is_simulated = has_own() && order_.front()->task->is_simulated();
+  bool have_all_voted = false;
   while (cut_.look().is_open()) {
     const time_ns_t now = monotonic_now_ns();
+    if (is_idle_ && !have_all_voted && to_vote_.load(std::memory_order_acquire) == 0) {
+      have_all_voted = true;
+      until_ns = later_by(now, idle_within_ns_);
+    }
     if (now >= until_ns || is_simulated) {
-      call_off(Off::timed_out);
+      call_off(have_all_voted ? Off::not_idle : Off::timed_out);
     } else {
+      // Two that enter their waits at one moment may each see the other pending.
+      if (have_all_voted && closer_ != nullptr) closer_->task->notify_commit();
       call_off_if_one_left();
       futex_wait_until(decided_, 0, std::min(until_ns, now + kLook));
     }
@@ -527,11 +582,34 @@ void Commit::throw_off() const {
       throw Error(ErrorCode::wrong_revision,
                   "the component was started or stopped, or it faulted, before the change was made", detail);
     }
+    case Off::not_idle:
+      throw_not_idle();
     case Off::timed_out:
     case Off::not_yet:
       throw_timeout();
   }
   throw_timeout();
+}
+
+void Commit::throw_not_idle() const {
+  std::string names;
+  for (const Participant& participant : participants_) {
+    if (participant.in_flight) names += (names.empty() ? "" : ", ") + participant.task->name();
+  }
+  const std::string within = std::to_string(idle_within_ns_ / ms_to_ns(1)) + " ms";
+  const Participant* const pending = pending_.load(std::memory_order_relaxed);
+  ErrorDetail detail{.element = "idle",
+                     .expected = "an instant at which no job of a participant is pending, within " + within,
+                     .found = "none",
+                     .remedy = "allow more time (idle_within_s), or make the change without `idle`"};
+  if (pending != nullptr) {
+    detail.component = pending->task->name();
+    detail.found = "a pending job of " + pending->task->name() + " at the last try";
+  }
+  throw Error(
+      ErrorCode::timeout,
+      "no instant at which all of " + names + " are idle came within " + within + "; nothing was changed",
+      detail);
 }
 
 void Commit::throw_timeout() const {

@@ -314,6 +314,10 @@ void Machine::change_at(time_ns_t instant_ns) noexcept {
   set_clock_ns(std::max(clock_ns(), instant_ns));  // what it writes on a stop belongs to the new parts
 }
 
+void Machine::delay_event_to(time_ns_t instant_ns) noexcept {
+  if (event_settled_ && waits_for_event()) set_clock_ns(std::max(clock_ns(), instant_ns));
+}
+
 time_ns_t Machine::resynchronise(time_ns_t epoch_ns) noexcept {
   join(epoch_ns);
   const Grid now = grid();

@@ -116,6 +116,8 @@ Task::Visit Task::visit_slot() noexcept {
       return Visit::goes_on;
     }
     if (!vote(participant, began)) return Visit::timed_out;
+  } else if (participant.commit->is_idle()) {
+    has_decided_ = participant.commit->close_if_idle(participant);
   }
   return look_at_cut(participant, began);
 }
@@ -123,8 +125,9 @@ Task::Visit Task::visit_slot() noexcept {
 /// In a wait, after its vote.
 Task::Visit Task::look_at_cut(Participant& participant, time_ns_t began_ns) noexcept {
   const CutWord seen = participant.commit->look();
-  const bool belongs_to_new = due_ns() == kForever || !machine_.is_settled() || due_ns() >= seen.instant_ns();
-  if (seen.is_closed() && belongs_to_new) return take(participant, began_ns);
+  const bool has_no_clock = due_ns() == kForever || !machine_.is_settled();
+  if (seen.is_closed() && (has_no_clock || participant.commit->is_new_at(due_ns())))
+    return take(participant, began_ns);
   if (!participant.has_voted) {
     trace_refusal(participant, began_ns);
   } else {
@@ -158,8 +161,8 @@ bool Task::visit_before_release() {
     leave_slot(kPosted);
     return true;
   }
-  const CutWord seen = participant.commit->raise(due_ns());
-  if (seen.is_closed() && due_ns() >= seen.instant_ns())
+  const CutWord seen = participant.commit->raise(due_ns(), machine_.waits_for_event());
+  if (seen.is_closed() && participant.commit->is_new_at(due_ns()))
     return settle_visit(take(participant, clock().now_ns())) && machine_.is_started();
   leave_slot(seen.is_off() ? kEmpty : kPosted);
   return true;
@@ -205,6 +208,7 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
     return Visit::timed_out;
   }
   const bool was_started = machine_.is_started();
+  if (was_started && commit.is_idle()) machine_.delay_event_to(commit.instant_ns());
   const bool was_parked = parked_.exchange(0, std::memory_order_acq_rel) != 0;
   const std::uint32_t wait_name = machine_.state_name();
   participant.visit_ns.store(clock().now_ns(), std::memory_order_relaxed);
@@ -221,7 +225,7 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   const bool stops = was_started && participant.afterwards == Afterwards::stop;
   if (stops || has_timed_out || !was_started) join_new_epoch(participant);
   if (was_parked && !has_timed_out) parked_.store(1, std::memory_order_seq_cst);
-  if (was_started) trace_take(participant);
+  if (was_started && !participant.is_silent) trace_take(participant);
   if (has_timed_out) {
     participant.released.store(Participant::kSuperseded, std::memory_order_release);
   } else if (!stops) {
@@ -233,7 +237,8 @@ Task::Visit Task::take(Participant& participant, time_ns_t began_ns) noexcept {
   const std::int64_t lost = goes_on ? machine_.skip_lost(began_ns, participant.armed_ns) : 0;
   if (participant.period_ns == 0) participant.lost += lost;  // a sporadic one has no instants to count there
   participant.resumes_ns = due_ns();
-  if (was_started) machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
+  if (was_started && (!participant.is_silent || lost != 0))
+    machine_.trace_at(participant.armed_ns, TraceKind::armed, wait_name, due_ns(), 1, lost);
   if (stops && !has_timed_out) park_stopped();
   wake_if_decided(commit);
   pass(participant);
@@ -351,6 +356,7 @@ bool Task::end_slot(Participant& participant) noexcept {
     return false;
   }
   const bool was_started = machine_.is_started();
+  if (was_started && commit.is_idle()) machine_.delay_event_to(commit.instant_ns());
   participant.parked_ns = clock().now_ns();
   participant.pending_ns = was_started ? due_ns() : 0;
   // Its outputs are not written yet: where a take hangs, a stop by force or the watchdog writes them.

@@ -380,6 +380,8 @@ def _reconfigure(ros: Any) -> Request:
         release_on_loss=ros.release_on_loss,
         over=ros.over,
         base=ros.base,
+        idle=ros.idle,
+        idle_within_s=ros.idle_within_s,
         **_commit(ros),
         **_common(ros),
     )

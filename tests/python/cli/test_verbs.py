@@ -66,6 +66,20 @@ def test_force_is_asked_for_by_a_flag_or_by_the_steps_file() -> None:
         load_change("steps.yaml", text=f"force: 1\n{steps}")
 
 
+def test_an_idle_instant_is_asked_for_by_a_flag_or_by_the_steps_file() -> None:
+    parser = build_parser()
+    plain = parser.parse_args(["reconfigure", "/e", "steps.yaml"])
+    assert (plain.idle, plain.idle_within) == (False, None)
+    idle = parser.parse_args(["reconfigure", "/e", "steps.yaml", "--idle", "--idle-within", "0.5"])
+    assert (idle.idle, idle.idle_within) == (True, 0.5)
+    steps = "steps: [{kind: stop, target: a}]"
+    change = load_change("steps.yaml", text=f"idle: true\nidle_within_s: 0.2\n{steps}")
+    assert (change.idle, change.idle_within_s) == (True, 0.2)
+    assert load_change("steps.yaml", text=steps).idle is False
+    with pytest.raises(ArchitectureFileError, match=":1:16: idle_within_s: "):
+        load_change("steps.yaml", text=f"idle_within_s: 11\n{steps}")
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -126,6 +126,28 @@ def test_force_is_the_kernel_s_to_use(
     assert _part(runtime, "counter").state == "STOPPED"
 
 
+def test_an_idle_change_is_made_while_no_job_is_pending_and_says_so(
+    runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spy = _Spy(runtime.host)
+    monkeypatch.setattr(runtime, "_host", spy)
+    step = Step("set_property", "counter", "step", "2.0")
+    plain = control.handle(Request(steps=(step,)))
+    idle = control.handle(Request(steps=(step,), idle=True, idle_within_s=2.5))
+    assert (plain.success, idle.success) == (True, True), idle.message
+    assert "no job" not in plain.message
+    assert "; made while no job of a participant was pending" in idle.message
+    stopped = control.handle(Request(steps=(Step("stop", "counter"),), idle=True))
+    assert stopped.success, stopped.message
+    assert [(options["idle"], options["idle_within_ns"]) for options in spy.options] == [
+        (False, 1_000_000_000),
+        (True, 2_500_000_000),
+        (True, 1_000_000_000),
+    ], "a stop alone is a transaction, too"
+    refused = control.handle(Request(steps=(step,), idle=True, idle_within_s=11.0))
+    assert (refused.code, "bad idle_within_s: expected 0" in refused.message) == (Code.INVALID, True)
+
+
 def test_the_report_of_a_late_component_has_the_instant_and_no_release() -> None:
     late = SimpleNamespace(
         component="a",

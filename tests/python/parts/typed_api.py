@@ -214,6 +214,8 @@ def change(architecture: Architecture, host: Host) -> TransactionReport:
     )
     host.commit(transaction, dry_run=True)
     assert_type(str(architecture.describe()), str)
+    report = host.commit(transaction, idle=True, idle_within_ns=ms_to_ns(20))
+    assert_type(report.is_idle, bool)
     return host.commit(transaction, expected_revision=architecture.revision(), commit_timeout_ns=ms_to_ns(50))
 
 

@@ -62,6 +62,19 @@ def _facts(reply: Any) -> list[tuple[object, ...]]:
 
 
 @pytest.mark.usefixtures("executor")
+def test_a_change_is_made_at_an_idle_instant_and_says_so(graph: Any) -> None:
+    steps = [_step("set_property", "counter", "step", "2.0")]
+    words = "made while no job of a participant was pending"
+    plain = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps)
+    assert (plain.success, words in plain.message) == (True, False), plain.message
+    idle = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps, idle=True, idle_within_s=5.0)
+    assert (idle.success, words in idle.message) == (True, True), idle.message
+    refused = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps, idle=True, idle_within_s=11.0)
+    assert refused.code == Code.INVALID
+    assert "bad idle_within_s: expected 0 (the default) to 10 s, found 11" in refused.message
+
+
+@pytest.mark.usefixtures("executor")
 def test_components_and_resources_come_and_go(graph: Any) -> None:
     states = graph.hear(ArchitectureState, f"{NODE}/state", LATCHED)
     events = graph.hear_events(NODE)

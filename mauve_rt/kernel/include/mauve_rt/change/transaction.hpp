@@ -204,6 +204,15 @@ struct TransactionOptions {
   // timeout, is stopped by force (Task::stop): it is FAULTED then, whatever becomes of the transaction. The commit is tried
   // once more, without the thread of one that is removed or stopped; for new parts it is refused (faulted).
   bool force{false};
+  // The change is made at an instant at which no job of a participant is pending: from T on all that executes has the new parts. The
+  // change is called off (timeout) when no such instant has come `idle_within_ns` after the last participant has agreed.
+  //
+  // Where the participants that run are pinned to one and the same CPU, no component that stands above the lowest of them has a job
+  // pending either. On several CPUs each component at or above a participant's priority takes part for that, if it may run on a CPU of
+  // that participant: it agrees, and takes nothing; one that is started or added meanwhile does not. A job that was timed out does not
+  // count. In virtual time a request takes no time: the change is called off at once where a job is pending. Not of a prepared change.
+  bool idle{false};
+  time_ns_t idle_within_ns{s_to_ns(1)};
 };
 
 struct TransactionReport {
@@ -212,6 +221,7 @@ struct TransactionReport {
   time_ns_t prepare_ns{0};             // all of it
   time_ns_t blackout_ns{0};            // the longest of any component's
   bool is_complete{true};              // false: a release that follows has not come yet
+  bool is_idle{false};                 // it was made while no job of a participant was pending
   time_ns_t instant_ns{kNotMeasured};  // T; kNotMeasured when the transaction changed no running component
 };
 

@@ -82,6 +82,8 @@ struct Participant {
   /// Its thread still runs a timed-out execution, and does not come back before the decision: it is to be removed, or takes the new epoch
   /// only.
   bool left_behind{false};
+  /// It has nothing to take: it votes, so that no job of its is pending at T (set_idle).
+  bool is_silent{false};
   bool has_voted{false};
 
   Atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in
@@ -145,6 +147,7 @@ struct Participant {
 /// | decided_ (futex)| who decides the cut                     | requester   | release/acquire; a hint, cut_ says it       |
 /// | refusal_state_  | the first participant that refuses      | requester   | release/acquire: the refusal is complete    |
 /// | refusal_, refused_by_, adopt_was_late_ | that one, in state writing | requester, if complete | refusal_state_ |
+/// | pending_        | who looks for an idle instant           | requester   | relaxed: for a message                      |
 /// | answered_       | requester                               | participants| relaxed: a hint                             |
 /// | off_, off_by_   | who calls it off first                  | requester   | relaxed before the cut's exchange           |
 /// | the rest        | requester, before it posts              | participants| the task's slot                             |
@@ -158,11 +161,11 @@ class Commit {
     made,
     refused,    // by an adopt, or by a check of this commit
     off,        // it was withdrawn, preempted, or the host is being shut down
-    timed_out,  // a participant did not vote in time, or a command of one lasted
+    timed_out,  // a participant did not vote in time, or a command of one lasted; no idle instant came in time
     changed,    // a participant is STOPPING or FAULTED
     stale,      // the architecture is not the one that it was prepared for
   };
-  enum class Off : std::uint8_t { not_yet, timed_out, withdrawn, shut_down, preempted, abandoned };
+  enum class Off : std::uint8_t { not_yet, timed_out, not_idle, withdrawn, shut_down, preempted, abandoned };
 
   /// Actions without a task are checks: their adopt runs on the requester, before it posts.
   Commit(std::size_t participants, std::vector<CommitAction*> actions);
@@ -184,6 +187,17 @@ class Commit {
   void set_yields() noexcept { yields_ = true; }
   /// [rt]
   bool yields() const MAUVE_RT { return yields_; }
+  /// It is made only at an instant at which no job of a participant is pending. After all have voted each participant that enters a
+  /// wait looks for one (Cut::close_if); the change is called off when none has come so long after the last vote. [setup]
+  ///
+  /// Where all participants that run are pinned to one and the same CPU, only the lowest of them closes: it runs, so no component above it
+  /// is ready, whether it takes part or not. Else each may close, and a component above one of them has to take part (is_silent).
+  void set_idle(time_ns_t within_ns) noexcept {
+    is_idle_ = true;
+    idle_within_ns_ = within_ns;
+  }
+  /// [rt]
+  bool is_idle() const MAUVE_RT { return is_idle_; }
   /// It is for threads that run: it ends when they are shut down. [setup]
   void set_hosted() noexcept { is_hosted_ = true; }
   /// What it makes of the table. [setup]
@@ -240,8 +254,19 @@ class Commit {
 
   /// [rt]
   CutWord look() const MAUVE_RT { return cut_.look(); }
-  /// Before a participant that has voted executes at this clock. [rt]
-  CutWord raise(time_ns_t clock_ns) MAUVE_RT { return cut_.raise(clock_ns); }
+  /// Before a participant that has voted executes at this clock. The end of a wait for an event comes at a clock that no look for an
+  /// idle instant could know. [rt]
+  CutWord raise(time_ns_t clock_ns, bool is_event) MAUVE_RT {
+    return is_idle_ && is_event ? cut_.raise_always(clock_ns) : cut_.raise(clock_ns);
+  }
+  /// Whether a job at this clock has the new parts. After an idle close each does: an event may be older than T. [rt]
+  bool is_new_at(time_ns_t clock_ns) const MAUVE_RT {
+    const CutWord seen = cut_.look();
+    return seen.is_closed() && (is_idle_ || clock_ns >= seen.instant_ns());
+  }
+  /// Of an idle one, by a participant in a wait, after its vote: makes the change if all have voted and no job is pending. True when
+  /// this call did it, as vote(). [rt]
+  bool close_if_idle(const Participant& by) MAUVE_RT;
   /// Runs the adopts of a participant; false when the change is refused, and called off. [rt] as far as the actions are.
   bool adopt(Participant& participant) noexcept;
   /// The participant agrees, and has executed nothing beyond this clock. True when it was the last: the caller wakes the
@@ -265,6 +290,9 @@ class Commit {
   bool lock(time_ns_t until_ns) noexcept MAUVE_LOCKS_UNSEEN;  // as many as take part
   void unlock() noexcept MAUVE_LOCKS_UNSEEN;
   bool has_commands() const MAUVE_RT;
+  bool is_one_cpu() const MAUVE_RT;
+  void choose_closer() MAUVE_RT;
+  const Participant* find_pending(CutWord seen) const MAUVE_RT;
   const Task* find_unfit() const noexcept;
   void begin() noexcept;
   bool check() noexcept;
@@ -282,14 +310,22 @@ class Commit {
   void start_parked(time_ns_t until_ns) noexcept;
   [[noreturn]] void throw_unfit() const;
   [[noreturn]] void throw_timeout() const;
+  [[noreturn]] void throw_not_idle() const;
   [[noreturn]] void throw_off() const;
 
   std::vector<Participant> participants_;
   std::vector<Participant*> order_;  // by the tasks' numbers: who commands two tasks takes them in this order
+  std::vector<Participant*>
+      posted_;  // as they are posted to: those of an idle one from the highest priority to the lowest
   std::vector<CommitAction*> actions_;
   bool yields_{false};
   bool is_hosted_{false};
   bool is_structural_{false};
+  bool is_idle_{false};
+  time_ns_t idle_within_ns_{0};
+  bool is_one_cpu_{false};
+  const Participant* closer_{nullptr};           // the lowest that runs; nullptr: all are parked
+  Atomic<const Participant*> pending_{nullptr};  // at the last look for an idle instant
   Atomic<bool> has_own_{false};
   time_ns_t timeout_ns_{0};
   const Task* unfit_{nullptr};

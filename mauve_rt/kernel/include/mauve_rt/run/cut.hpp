@@ -2,6 +2,7 @@
 // The cut of a change: one atomic word that says whether it is made, and from which instant on.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 
 #include "mauve_rt/base/rt.hpp"
@@ -43,6 +44,10 @@ struct CutWord {
 ///
 /// Every exchange is acq_rel and every look acquires: a thread that sees the word decided sees all that was written before
 /// the decision. A raise that has nothing to raise writes nothing and publishes nothing: the count of the votes does that.
+///
+/// The checked close (close_if) is of a change that is made only while no participant has a job pending: who closes looks at the
+/// cut first, then at each participant, and closes only if the word is still the one that it saw. An open word never comes back,
+/// since its frontier only grows. So nothing was executed in between by whoever raises the cut first.
 class Cut {
  public:
   constexpr explicit Cut(CutWord word = {}) noexcept : word_(word.bits) {}
@@ -61,6 +66,17 @@ class Cut {
     return seen;
   }
 
+  /// The same, to a frontier that is later than the present one in any case: of a clock that may lie before the frontier although no
+  /// participant was seen to have it pending. [rt]
+  CutWord raise_always(time_ns_t clock_ns) MAUVE_RT {
+    CutWord seen = look();
+    while (seen.is_open()) {
+      const CutWord raised = CutWord::open_at(std::max(clock_ns, seen.instant_ns()));
+      if (exchange(seen, raised)) return raised;
+    }
+    return seen;
+  }
+
   /// By the last vote. Returns what the cut is then: closed or off. [rt]
   CutWord close() MAUVE_RT {
     CutWord seen = look();
@@ -69,6 +85,13 @@ class Cut {
       if (exchange(seen, closed)) return closed;
     }
     return seen;
+  }
+
+  /// Closes the cut if it is still this word, which was open. Whether this call did it. [rt]
+  bool close_if(CutWord seen) MAUVE_RT {
+    // strong: one that fails without a cause would lose an idle instant
+    return word_.compare_exchange_strong(seen.bits, seen.bits | CutWord::kClosed, std::memory_order_acq_rel,
+                                         std::memory_order_acquire);
   }
 
   /// Whether this call did it: false when the change is made, or was called off before. [rt]

@@ -165,6 +165,19 @@ class Machine {
   std::int64_t skip_lost(time_ns_t since_ns, time_ns_t now_ns) MAUVE_RT;
   /// Executes at no clock before this one any more: T of a change that it has taken. [rt]
   void change_at(time_ns_t instant_ns) MAUVE_RT;
+  /// An event that has ended the wait under way counts as one of this instant at the earliest. [rt]
+  void delay_event_to(time_ns_t instant_ns) MAUVE_RT;
+  /// Whether the wait under way is for an event. [rt]
+  bool waits_for_event() const MAUVE_RT {
+    const State* const wait = present_wait();
+    return wait != nullptr && wait->event != nullptr;
+  }
+  /// Whether a job may be pending, or executing, whose clock is this one or an earlier one. What is told of a wait, its pending instant,
+  /// moves on only when the next wait is entered, as the last step of that. [rt], anyone, of one that is started
+  bool may_have_job_at(time_ns_t clock_ns) const MAUVE_RT {
+    const std::optional<PresentState::Fact> fact = present_.look();
+    return !fact || !fact->is_wait || fact->since_ns <= clock_ns;
+  }
   /// The last clock at which it began to execute, or T - 1 of its last change if that is later. [rt]; other threads once it
   /// is parked or timed out.
   time_ns_t entered_ns() const MAUVE_RT { return entered_ns_.load(std::memory_order_relaxed); }

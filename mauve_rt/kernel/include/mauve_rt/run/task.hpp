@@ -255,6 +255,8 @@ class Task final : public Waiter {
   void take_parked(Participant& participant) noexcept;
   /// Machine::entered_ns() [rt], parked or timed out.
   time_ns_t entered_ns() const MAUVE_RT { return machine_.entered_ns(); }
+  /// Whether a job of it may be pending, or executing, whose clock is this one or an earlier one. [rt], anyone, while it runs
+  bool may_have_job_at(time_ns_t clock_ns) const MAUVE_RT { return machine_.may_have_job_at(clock_ns); }
   /// It has left the architecture: it starts no more. [rt], in a take.
   void set_removed() MAUVE_RT { removed_.store(true, std::memory_order_release); }
   /// Writes the outputs that say so: on_commit, or on_stop. [rt]
