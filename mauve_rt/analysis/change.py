@@ -11,7 +11,7 @@ Before, a participant's new core adopts the state of the old one, and at x takes
 A change at an idle instant finds no job of a participant pending, nor one of a component above the lowest
 participant. No busy window of these has T in it: it has the demand before the change or that after it, each
 with the handover. Components below the lowest participant, or with its priority, may have any window; but
-what a participant did before the change in it is done at the change, so it is no longer than x.
+what participants did in it before the change is done at the change, so all of that is no longer than x.
 
 Sources: Tindell, Burns, Wellings, "Mode changes in priority pre-emptively scheduled systems", RTSS 1992, for
 one instant instead of a request for each task; Tindell, Alonso, "A very simple protocol for mode changes in
@@ -191,8 +191,28 @@ def _worst(mixes: "Sequence[_Mix]", delay: Delay, jitter_ns: int, instants: "_In
 
 def _together(mixes: "Sequence[_Mix]") -> list[Work]:
     """Those that change, and all others as one."""
+    changed = [mix for mix in mixes if mix.is_changed]
     others = [mix.unchanged for mix in mixes if not mix.is_changed]
-    return [*(mix for mix in mixes if mix.is_changed), *([Together(others)] if others else [])]
+    return [*([_Changed(changed)] if changed else []), *([Together(others)] if others else [])]
+
+
+class _Changed:
+    """What those that change ask for, together."""
+
+    def __init__(self, mixes: "Sequence[_Mix]") -> None:
+        self._mixes = mixes
+
+    def in_ns(self, length_ns: int) -> int:
+        """The most work that is released in a half-open interval of this length."""
+        most_ns = sum(mix.in_ns(length_ns) for mix in self._mixes)
+        before_ns = self._mixes[0].most_before_ns
+        if before_ns >= most_ns:
+            return most_ns
+        return min(most_ns, before_ns + sum(mix.after_ns(length_ns) for mix in self._mixes))
+
+    def until_ns(self, instant_ns: int) -> int:
+        """The same of the closed [0, instant]."""
+        return self.in_ns(instant_ns + 1)
 
 
 def _instants(changed: "Sequence[_Mix]", window_ns: int) -> Iterator[int]:
@@ -222,7 +242,9 @@ class _Mix:
     """
 
     def __init__(self, member: Member, jitter_ns: int, *, is_idle: bool) -> None:
-        self.change_ns = self._most_before_ns = FOREVER_NS
+        self.change_ns = FOREVER_NS
+        self.most_before_ns = FOREVER_NS
+        """Of old jobs, of all that change together."""
         self._is_idle = is_idle
         self._jitter_ns = jitter_ns
         self.is_changed = isinstance(member, Participant)
@@ -241,7 +263,7 @@ class _Mix:
     def change_at(self, change_ns: int, latest_ns: int) -> None:
         """From now on the answers are for this instant, of an idle one for all in between."""
         self.change_ns = change_ns
-        self._most_before_ns = latest_ns if self._is_idle and self.is_changed else FOREVER_NS
+        self.most_before_ns = latest_ns if self._is_idle and self.is_changed else FOREVER_NS
         if not self.is_changed or change_ns == FOREVER_NS:
             self._switches = []
             return
@@ -259,17 +281,17 @@ class _Mix:
         if length_ns <= 0:
             return 0
         until_ns = length_ns + self._jitter_ns
-        work_ns = min(self._old.in_ns(min(until_ns, self.change_ns)), self._most_before_ns)
+        work_ns = min(self._old.in_ns(min(until_ns, self.change_ns)), self.most_before_ns)
         for release_ns, before_ns in self._switches:
             if release_ns >= until_ns:
                 break
-            done_ns = min(before_ns, self._most_before_ns)
+            done_ns = min(before_ns, self.most_before_ns)
             work_ns = max(work_ns, done_ns + self._new.in_ns(until_ns - release_ns))
         return work_ns + self._handover_ns
 
-    def until_ns(self, instant_ns: int) -> int:
-        """The same of the closed [0, instant]."""
-        return self.in_ns(instant_ns + 1)
+    def after_ns(self, length_ns: int) -> int:
+        """The most of new jobs, and the handover."""
+        return self._new.in_ns(length_ns + self._jitter_ns - self.change_ns) + self._handover_ns
 
     def jobs_until(self, end_ns: int) -> Iterator[Path]:
         """Jobs that are released before then, with the work up to their ends."""
@@ -279,7 +301,7 @@ class _Mix:
         for path in self._old_before(min(end_ns, self.change_ns)):
             yield path._replace(work_ns=path.work_ns + self._handover_ns)
         for release_ns, before_ns in self._switches:
-            work_ns = min(before_ns, self._most_before_ns) + self._handover_ns
+            work_ns = min(before_ns, self.most_before_ns) + self._handover_ns
             for path in paths(self._new_task):
                 if release_ns + path.release_ns >= end_ns:
                     break

@@ -118,7 +118,7 @@ class Planner:
     def _judged(
         self, words: str, after: "_After", *, is_idle: bool = False, awaits_idle: bool = True
     ) -> Plan:
-        """`awaits_idle`: an executor that requires schedulable changes makes it at an idle instant, if needed."""
+        """`awaits_idle`: the executor makes it at an idle instant where it requires schedulable changes."""
         awaits_idle &= self._model.executor.require_schedulable is True
         judged = judged_change(
             self._now, self._surroundings, *after, is_idle=is_idle, awaits_idle=awaits_idle

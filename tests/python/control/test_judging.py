@@ -109,6 +109,37 @@ def test_a_change_between_two_schedulable_architectures_is_refused(running: Runn
     assert asked(control, *SWAP, dry_run=True) == refused, "a dry run says the same"
 
 
+LATER = PAIR.replace("deadline_ns: 18000000", "deadline_ns: 25000000")
+"""The swap may take c to 26 ms, and at an idle instant to less."""
+
+
+def test_it_is_made_at_an_idle_instant_where_the_verdict_needs_that(running: Running) -> None:
+    control, runtime, _ = running(LATER)
+    told = asked(control, *SWAP, dry_run=True)
+    assert outcomes(told) == ["schedulable"] * 3
+    assert told.timing[1].sentence.endswith(", with the change at an idle instant")
+    made = asked(control, *SWAP)
+    assert made.code is Code.OK, made.message
+    assert "; made while no job of a participant was pending" in made.message
+    assert outcomes(made) == ["schedulable"] * 3
+    assert {part.name for part in runtime.components()} == {"a2", "b2", "c"}
+
+
+def test_where_it_only_warns_the_executor_says_that_an_idle_instant_would_do(running: Running) -> None:
+    control, _, _ = running(LATER.replace("require_schedulable: true", "require_schedulable: warn"))
+    made = asked(control, *SWAP)
+    assert made.code is Code.OK, made.message
+    assert "; at an idle instant (idle: true): schedulable" in made.message
+    assert "made while no job" not in made.message
+
+
+def test_one_that_is_asked_for_at_an_idle_instant_is_judged_so(running: Running) -> None:
+    control, _, _ = running(LATER.replace("require_schedulable: true", "require_schedulable: warn"))
+    made = control.handle(Request(steps=SWAP, idle=True))
+    assert outcomes(made) == ["schedulable"] * 3
+    assert "warning" not in made.message
+
+
 def test_in_two_changes_it_is_made(running: Running) -> None:
     control, _, _ = running(PAIR)
     made = asked(control, Step("remove_component", "a"))
