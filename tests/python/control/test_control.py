@@ -174,7 +174,7 @@ def test_releases_that_were_missed_are_in_the_message() -> None:
     nothing = SimpleNamespace(component="a", missed_releases=0, from_core="p/A", to_core="p/B")
     two = SimpleNamespace(component="a", missed_releases=2, remark="its new grid began later")
     unknown = SimpleNamespace(component="b", missed_releases=NOT_MEASURED)
-    measured: Any = SimpleNamespace(steps=[nothing], prepare_ns=0, blackout_ns=0)
+    measured: Any = SimpleNamespace(steps=[nothing], prepare_ns=0, blackout_ns=0, is_idle=False)
     assert message_of(steps[:1], measured) == "component 'a' runs p/B, before p/A"
     measured.steps = [two, two, unknown]
     done = "3 steps are in force; prepared in 0 ms"
