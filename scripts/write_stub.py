@@ -197,7 +197,7 @@ class StubPrinter(Printer):
 
 def settings_types(module: ModuleType) -> list[str]:
     """Classes of what add_component() takes by keyword: no function of C++ has them in its signature."""
-    kinds = {int: "int", str: "str", list: "list[int]"}
+    kinds = {int: "int", str: "str", list: "list[int]", bool: "bool"}
     settings = []
     for name, each in module.TASK_SETTINGS.items():
         says = " or ".join(each.choices) or each.hint

@@ -24,13 +24,17 @@ class Subject:
     """What keeps it from being proved."""
 
     @classmethod
-    def of(cls, machine: Machine, others: Sequence[Machine] = (), *, overhead_ns: int = 0) -> Self:
+    def of(
+        cls, machine: Machine, others: Sequence[Machine] = (), *, overhead_ns: int = 0, overrun_ns: int = 0
+    ) -> Self:
         """With its jobs, its period where it does not run yet, and what is missing.
 
         `others`: components and threads of the same architecture; the component may be among them.
-        `overhead_ns`: what a release costs beside the states, on this computer.
+        `overhead_ns`: what a release costs beside the states, on this computer. `overrun_ns`: CPU time that
+        an execution uses beyond its enforced worst case before the watchdog ends it.
         """
-        task = digraph_of(machine, overhead_ns=overhead_ns)
+        states = tuple(state.overrunning(overrun_ns) for state in machine.states)
+        task = digraph_of(replace(machine, states=states), overhead_ns=overhead_ns)
         if not machine.period_ns and not any(state.is_event_wait for state in machine.states):
             machine = replace(machine, period_ns=period_of(task))
         return cls(machine, task, tuple(obstacles(machine, others)))

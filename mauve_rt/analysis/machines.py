@@ -41,6 +41,8 @@ class State:
     """Of an execution state; of a wait that of all guards that are asked at its end."""
     limit_ns: int = 0
     """Of an execution state: its wall-clock bound, above which the watchdog faults the component; 0: none."""
+    is_enforced: bool = False
+    """Whether an execution that uses more CPU time than `time` faults the component."""
 
     @classmethod
     def of(cls, told: Any) -> Self:
@@ -55,7 +57,25 @@ class State:
             successors=tuple(told.successors),
             time=_declared_time(told),
             limit_ns=int(told.max_execution_ns),
+            is_enforced=bool(getattr(told, "wcet_enforced", False)),
         )
+
+    @property
+    def is_watched(self) -> bool:
+        """Whether the watchdog faults the component for an execution that is too long."""
+        return bool(self.limit_ns) or self.is_enforced
+
+    def overrunning(self, overrun_ns: int) -> Self:
+        """The same, with the CPU time that an execution can use before the watchdog ends it.
+
+        `overrun_ns`: beyond an enforced worst case; not beyond the wall-clock bound.
+        """
+        if not self.is_enforced or self.time.ns is None:
+            return self
+        most_ns = self.time.ns + overrun_ns
+        if self.limit_ns:
+            most_ns = min(most_ns, max(self.limit_ns, self.time.ns))
+        return replace(self, time=replace(self.time, ns=most_ns))
 
 
 def _declared_time(told: Any) -> ExecutionTime:
@@ -205,6 +225,17 @@ class Machine:
     def missing(self) -> tuple[str, ...]:
         """States whose time is not known: executions, and waits with guards."""
         return tuple(state.name for state in self.states if state.time.ns is None)
+
+    @property
+    def is_enforced(self) -> bool:
+        """Whether the worst case of each execution is enforced."""
+        executions = [state for state in self.states if not state.is_wait]
+        return bool(executions) and all(state.is_enforced for state in executions)
+
+    @property
+    def has_guarded_waits(self) -> bool:
+        """Whether guards decide where a wait leads."""
+        return any(state.is_wait and len(state.successors) > 1 for state in self.states)
 
     @property
     def measured(self) -> tuple[str, ...]:

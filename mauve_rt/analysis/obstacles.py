@@ -95,7 +95,7 @@ def unknown_costs(threads: Any) -> Iterator[str]:
 
 def assumptions_about(machines: Sequence[Machine]) -> Iterator[str]:
     """What a proof for these components takes for granted, each as what stands behind an `if`."""
-    yield "each execution ends within its declared time (only max_execution_ns is enforced)"
+    yield from _ends_of_executions(machines)
     if named_twice(resource for machine in machines for resource in machine.resources):
         yield "no component holds a lock for longer than longest_hold_ns, or two locks at once"
     for machine in machines:
@@ -110,6 +110,16 @@ def assumptions_about(machines: Sequence[Machine]) -> Iterator[str]:
         yield "the host of this virtual machine takes no CPU from it"
     yield "no other real-time thread runs on these CPUs, and no interrupt takes one for long"
     yield "no component faults, stops or is changed, and no rule of the executor acts"
+
+
+def _ends_of_executions(machines: Sequence[Machine]) -> Iterator[str]:
+    """Of whom a time is only declared, and of whom a mechanism enforces it."""
+    if names := ", ".join(one.name for one in machines if not one.is_enforced):
+        yield f"each execution of {names} ends within its declared time (only max_execution_ns is enforced)"
+    if names := ", ".join(one.name for one in machines if one.is_enforced):
+        yield f"each execution of {names} uses at most its wcet_ns of CPU time (enforced), and never sleeps"
+    if guarded := ", ".join(one.name for one in machines if one.is_enforced and one.has_guarded_waits):
+        yield f"the guards of waits of {guarded} end within their declared time (not enforced)"
 
 
 def runtime_us(root: Path = _ROOT) -> int:

@@ -10,7 +10,7 @@ from mauve_rt.analysis.machines import Machine, in_ms
 from mauve_rt.analysis.obstacles import unknown_costs
 from mauve_rt.analysis.plan import Handovers, bounds_during, subjects_during
 from mauve_rt.analysis.refutation import Measured, contradictions
-from mauve_rt.analysis.threads import machines_of
+from mauve_rt.analysis.threads import WATCHDOG, machines_of
 from mauve_rt.analysis.time_limit import optional_part
 from mauve_rt.analysis.verdict import Outcome, Verdict, judge, miss_text, missing_of
 
@@ -61,6 +61,15 @@ class Surroundings:
         """Of a release; 0: or it is not known."""
         return max(int(self.threads.overhead_ns), 0)
 
+    @property
+    def overrun_ns(self) -> int:
+        """CPU time beyond an enforced worst case: until the watchdog looks again, wakes up and has looked."""
+        return sum(
+            int(each.min_interarrival_ns) + int(each.wcet_ns) + self.wakeup_ns
+            for each in self.threads.tasks
+            if each.name == WATCHDOG
+        )
+
 
 def study(
     components: Sequence[Machine],
@@ -71,7 +80,8 @@ def study(
     """An architecture; `measured`: what a recording of it shows, by component."""
     threads = machines_of(surroundings.threads.tasks, components)
     machines = [*components, *threads, *surroundings.beside]
-    subjects = [Subject.of(machine, machines, overhead_ns=surroundings.overhead_ns) for machine in machines]
+    costs = {"overhead_ns": surroundings.overhead_ns, "overrun_ns": surroundings.overrun_ns}
+    subjects = [Subject.of(machine, machines, **costs) for machine in machines]
     wakeup_ns = surroundings.wakeup_ns
     bounds = bounds_of(subjects, wakeup_ns=wakeup_ns)
     unknown = [*unknown_costs(surroundings.threads), *surroundings.unknown]

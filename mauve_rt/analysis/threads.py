@@ -9,6 +9,8 @@ from typing import Any
 
 from mauve_rt.analysis.machines import FOREVER_NS, ExecutionTime, Hold, Machine, State
 
+WATCHDOG = "watchdog"
+"""Name of the thread that ends executions which are too long."""
 _REMEDIES = {
     "topics_out": "declare wcet_ns and min_interarrival_ns of executor.sender, or lower its priority",
     "stops_out": "declare wcet_ns and min_interarrival_ns of executor.sender, or lower its priority",

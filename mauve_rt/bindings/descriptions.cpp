@@ -304,7 +304,9 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("wcet_core", &S::wcet_core,
                     "The core that declares wcet_ns; '': the architecture file or the fsm does.")
       .def_readonly("methods_without_wcet", &S::methods_without_wcet,
-                    "Of a core that declares times of other methods: wcet_ns is 0.");
+                    "Of a core that declares times of other methods: wcet_ns is 0.")
+      .def_readonly("wcet_enforced", &S::wcet_enforced,
+                    "An execution that uses more CPU time than wcet_ns faults its component.");
   using C = ComponentDescription;
   py::class_<C>(module, "ComponentDescription", "A snapshot; fields as mauve_msgs/msg/ComponentInfo.")
       .def_readonly("name", &C::name)

@@ -9,6 +9,7 @@ namespace {
 /// Throws py::type_error for a value of another type than the setting's.
 SettingValue from_python(const TaskSetting& setting, const SettingValue& example, py::handle value) {
   try {
+    if (std::holds_alternative<bool>(example) && !py::isinstance<py::bool_>(value)) throw py::cast_error();
     return std::visit(
         [value](const auto& same) -> SettingValue { return value.cast<std::decay_t<decltype(same)>>(); },
         example);
@@ -26,7 +27,7 @@ struct StateTime {
 constexpr auto kStateTimes = std::to_array<StateTime>(
     {{"max_execution_ns", "the bound that the watchdog enforces", &DeclaredState::max_execution_ns},
      {"simulated_execution_ns", "what it takes in virtual time", &DeclaredState::simulated_execution_ns},
-     {"wcet_ns", "worst case for the timing analysis; not enforced", &DeclaredState::wcet_ns}});
+     {"wcet_ns", "worst case in CPU time; enforced where enforce_wcet is set", &DeclaredState::wcet_ns}});
 
 /// {"Run": {"max_execution_ns": 1000, "simulated_execution_ns": 0, "wcet_ns": 900}}; each may be left out, or be None.
 std::vector<DeclaredState> declared_states(py::handle value) {

@@ -168,7 +168,7 @@ def _threads_after(model: ArchitectureModel, change: Change, machines: Sequence[
     uses = uses_of(model)
     for added in _added_resources(model, change):
         uses |= uses_of(added)
-    has_bounds = any(state.limit_ns for machine in machines for state in machine.states)
+    has_bounds = any(state.is_watched for machine in machines for state in machine.states)
     return thread_list(model.executor, uses, components=len(machines), has_bounds=has_bounds)
 
 

@@ -61,7 +61,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--write",
         action="store_true",
-        help="write the measured times into FILE as wcet_ns (nothing enforces wcet_ns)",
+        help="write the measured times into FILE as wcet_ns (enforced where enforce_wcet is set)",
     )
     parser.add_argument(
         "--suppose",
@@ -324,7 +324,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
         unfinished.replace(whole)
     finally:
         unfinished.unlink(missing_ok=True)
-    print(f"{path}: {counted(count, 'time')} written as wcet_ns; nothing enforces them", file=sys.stderr)
+    print(f"{path}: {counted(count, 'time')} written as wcet_ns; enforce_wcet enforces them", file=sys.stderr)
 
 
 def _response(bound: "Bound") -> dict[str, Any]:

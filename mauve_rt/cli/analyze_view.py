@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 from mauve_rt.analysis.bounds import Bound, Subject
 from mauve_rt.analysis.digraph import Job
 from mauve_rt.analysis.machines import FOREVER_NS, Machine, State, in_ms
-from mauve_rt.analysis.study import Study
+from mauve_rt.analysis.study import Study, Surroundings
 from mauve_rt.analysis.verdict import Outcome
 from mauve_rt.model.threads import ThreadList
 
@@ -26,13 +26,18 @@ def print_model(now: Study, threads: ThreadList) -> None:
     costs += [f"costs {in_ms(threads.overhead_ns)}"] if threads.overhead_ns >= 0 else []
     if costs:
         print(f"each release {' and '.join(costs)}")
+    if any(state.is_enforced for subject in now.subjects for state in subject.machine.states):
+        overrun_ns = Surroundings(threads=threads).overrun_ns
+        print(
+            f"the watchdog ends an execution up to {in_ms(overrun_ns)} of CPU time above its enforced wcet_ns"
+        )
 
 
 def _print_component(subject: Subject, bound: Bound) -> None:
     print(f"{subject.name}: {_scheduling(subject.machine)}")
     for state in subject.machine.states:
         if not state.is_wait:
-            print(f"  {state.name}: {state.time}{_limit(state)}")
+            print(f"  {state.name}: {state.time}{', enforced' * state.is_enforced}{_limit(state)}")
         elif len(state.successors) > 1:
             print(f"  guards of {state.name}: {state.time}")
     for hold in subject.machine.holds:

@@ -101,7 +101,7 @@ def _of_file(path: Path, models: Sequence[Path]) -> Analyzed:
             machine if machine.is_python else machine.without_locks(_wait_free(part, kinds))
             for machine, part in zip(machines, architecture.components(), strict=True)
         ]
-    has_bounds = any(state.limit_ns for machine in machines for state in machine.states)
+    has_bounds = any(state.is_watched for machine in machines for state in machine.states)
     threads = thread_list(
         model.executor, uses_of(model), components=len(model.components), has_bounds=has_bounds
     )

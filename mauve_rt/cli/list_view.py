@@ -70,6 +70,8 @@ def print_held(reply: Any, out: Console) -> None:
 
 
 def _print_remarks(component: Any, out: Console) -> None:
+    if enforced := ", ".join(state.name for state in component.states if state.wcet_enforced):
+        out.print(f"[bold]{component.name}[/]: wcet_ns is enforced of {enforced}", soft_wrap=True)
     if component.fault:
         out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
     for probation in component.probations:

@@ -86,7 +86,9 @@ def with_times_of_core(
     described = {state.name: state for state in part.states}
     states = tuple(
         replace(state, time=_own_time(state, described[state.name], times, part.core, declared.core))
-        if state.name in declared.states and declared.states[state.name].wcet_ns is not None
+        if state.name in declared.states
+        and declared.states[state.name].wcet_ns is not None
+        and not state.is_enforced  # of whatever core
         else state
         for state in machine.states
     )

@@ -21,7 +21,7 @@ def threads_of(
         runtime: what runs.
         components: that there are, with their names.
         uses: how threads that are no components use resources, as `uses_of`.
-        has_bounds: a state of a component has a `max_execution_ns`.
+        has_bounds: a state of a component has a `max_execution_ns`, or an enforced worst case.
         others: real-time threads of the process.
 
     """

@@ -73,7 +73,7 @@ class Timing:
     def _threads(
         self, components: Sequence[Machine], uses: Mapping[str, Collection[str]], others: Iterable[ThreadInfo]
     ) -> ThreadList:
-        has_bounds = any(state.limit_ns for machine in components for state in machine.states)
+        has_bounds = any(state.is_watched for machine in components for state in machine.states)
         return threads_of(self._runtime, components, uses, has_bounds=has_bounds, others=others)
 
     def of_change(

@@ -186,7 +186,9 @@ def task_list(
     others: Iterable[ThreadInfo] = (),
 ) -> Any:
     """TaskList; `uses` and `others`: as for `threads_of`."""
-    has_bounds = any(state.max_execution_ns for part in components for state in part.states)
+    has_bounds = any(
+        state.max_execution_ns or state.wcet_enforced for part in components for state in part.states
+    )
     known = threads_of(runtime, components, uses, has_bounds=has_bounds, others=others)
     return TaskList(
         wakeup_ns=known.wakeup_ns,

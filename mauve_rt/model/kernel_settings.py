@@ -3,7 +3,7 @@
 from typing import Any
 
 from mauve_rt._kernel import TASK_SETTINGS
-from mauve_rt.file_schema.kinds import Choice, Kind, ListOf, Real, Whole
+from mauve_rt.file_schema.kinds import Choice, Flag, Kind, ListOf, Real, Whole
 from mauve_rt.file_schema.section import Setting
 
 _NS_PER_MS = 1e6
@@ -20,6 +20,8 @@ class KernelSetting(Setting):
         usual: Any = known.default
         if isinstance(usual, list):  # CPUs: that the machine has one, element_problems() sees
             kind, usual = ListOf(Whole(known.least, _INT_MAX), few=1), usual or None
+        elif isinstance(usual, bool):
+            kind = Flag()
         elif isinstance(usual, int):
             kind = Whole(known.least, known.most)
             if not known.least <= usual <= known.most:

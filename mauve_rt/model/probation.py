@@ -16,7 +16,7 @@ MAX_VIOLATIONS = 50
 VIOLATIONS: Mapping[str, str] = {
     "fault": "the core raises, or one of its states lasts longer than declared",
     "overrun": "the component enters a wait after its end",
-    "over_declared": "a state lasts longer than declared (max_execution)",
+    "over_declared": "a state lasts longer than declared (max_execution, or wcet_ns with enforce_wcet)",
     "nan": "a number of any output is NaN",
 }
 DEFAULT_VIOLATIONS = ("fault", "nan")

@@ -451,7 +451,8 @@ class StateModel(Section):
     )
     wcet_ns: int | None = setting(
         Whole(1, _LONGEST_NS),
-        "worst-case execution time, of a wait its guards', for the timing analysis; nothing enforces it",
+        "worst-case execution time (CPU time), of a wait its guards', for the timing analysis; enforce_wcet "
+        "of the component enforces that of executions",
         default=None,
     )
 
@@ -508,6 +509,9 @@ class ComponentModel(Section):
     deadline_ns: int | None = kernel_setting(
         "deadline_ns",
         "deadline of a job after its release, for the timing analysis; without the key the next instant",
+    )
+    enforce_wcet: bool = kernel_setting(
+        "enforce_wcet", "fault the component when an execution uses more CPU time than its wcet_ns"
     )
     states: dict[str, StateModel] = setting(
         TableOf(Part(StateModel), names=IDENTIFIER),

@@ -53,7 +53,7 @@ def thread_list(
         executor: settings of the process.
         uses: of resources, as `uses_of`.
         components: how many.
-        has_bounds: a state has a `max_execution_ns`, so that the watchdog looks.
+        has_bounds: a state has a `max_execution_ns` or an enforced worst case, so that the watchdog looks.
 
     """
     threads = [ThreadInfo("trace", priority=1)]

@@ -56,7 +56,8 @@ class Core(Configurable, Generic[ShellT]):
 
     wcet_ns: ClassVar[Mapping[str, int]] = {}
     """Worst-case execution times of actions and guards for the timing analysis: {"follow": us_to_ns(200)}.
-    Nothing enforces them. An execution state takes that of its action and of the guards asked after it."""
+    An execution state takes that of its action and of the guards asked after it, and `enforce_wcet` enforces
+    the sum."""
 
     _shell_class: ClassVar[type[Any]] = Shell
 

@@ -77,7 +77,7 @@ class Fsm(Configurable, Generic[ShellT, CoreT]):
 
         `max_execution_ns` is its bound, which the watchdog enforces, 0: none; `simulated_execution_ns` is
         what it takes in virtual time; `wcet_ns` is its worst-case execution time, which the timing analysis
-        takes and nothing enforces, 0: not declared.
+        takes and `enforce_wcet` enforces, 0: not declared.
         """
         times = (max_execution_ns, simulated_execution_ns, wcet_ns)
         self._machine.execution(name, _method_name(method), *times)

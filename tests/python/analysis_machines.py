@@ -10,11 +10,16 @@ MS = 1_000_000
 
 
 def execution(
-    name: str, *successors: str, bound_ms: float = 0.0, wcet_ms: float = 0.0, initial: bool = False
+    name: str,
+    *successors: str,
+    bound_ms: float = 0.0,
+    wcet_ms: float = 0.0,
+    initial: bool = False,
+    enforced: bool = False,
 ) -> SimpleNamespace:
     """As mauve_msgs/msg/StateInfo has it."""
     times = {"max_execution_ns": round(bound_ms * MS), "wcet_ns": round(wcet_ms * MS)}
-    return _state(name, successors, is_initial=initial, **times)
+    return _state(name, successors, is_initial=initial, wcet_enforced=enforced, **times)
 
 
 def wait(
@@ -32,7 +37,7 @@ def event(name: str, *successors: str, least_ms: int, initial: bool = False) -> 
 
 
 def _state(name: str, successors: tuple[str, ...], **told: Any) -> SimpleNamespace:
-    usual = dict.fromkeys(("is_initial", "is_wait", "is_event_wait"), False)
+    usual = dict.fromkeys(("is_initial", "is_wait", "is_event_wait", "wcet_enforced"), False)
     numbers = ("duration_ns", "min_interarrival_ns", "max_execution_ns", "simulated_execution_ns", "wcet_ns")
     return SimpleNamespace(
         **{**usual, **dict.fromkeys(numbers, 0), "name": name, "successors": successors, **told}

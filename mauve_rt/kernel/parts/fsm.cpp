@@ -325,7 +325,8 @@ std::vector<DescribedState> FsmBase::describe_states() const {
                    .guards = {},
                    .event_port = state->event != nullptr ? state->event->port().name() : "",
                    .wcet_core = {},
-                   .methods_without_wcet = {}});
+                   .methods_without_wcet = {},
+                   .wcet_enforced = false});
     for (const State* next : successors(*state)) all.back().successors.push_back(next->name);
     for (const Transition& transition : state->transitions)
       all.back().guards.push_back(methods_[transition.guard].name());

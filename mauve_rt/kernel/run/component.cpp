@@ -147,13 +147,20 @@ std::vector<DescribedState> Component::described_states() const {
   }
   // Not in show(): a fallback may take the core's place at any moment.
   if (const ShownCore* const core = shown_core_.load(std::memory_order_acquire))
-    add_core_times(states, core->name, core->wcet_ns);
+    add_worst_cases(states, core->name, core->wcet_ns);
   return states;
+}
+
+void Component::add_worst_cases(std::vector<DescribedState>& states, const std::string& core,
+                                const CoreTimes& times) const {
+  add_core_times(states, core, times);
+  for (DescribedState& state : states)
+    state.wcet_enforced = task_.settings().enforce_wcet && !state.is_wait && state.wcet_ns != 0;
 }
 
 std::vector<DescribedState> Component::states_of(const FsmBase& fsm, const CoreBase& core) const {
   std::vector<DescribedState> states = fsm.describe_states();
-  add_core_times(states, core.implementation(), core.wcet_ns());
+  add_worst_cases(states, core.implementation(), core.wcet_ns());
   for (const DescribedState& state : states)
     check_wcet(state.name, state.wcet_ns, state.max_execution_ns, name_, state.wcet_core);
   return states;
@@ -314,7 +321,10 @@ CoreBinding Component::require_binding(CoreBase& core, const FsmBase& fsm) const
   CoreBinding binding = fsm.bind_core(core);
   binding.core = &core;
   if (binding.is_bound()) {
-    states_of(fsm, core);  // checks the core's times
+    for (const DescribedState& state : states_of(fsm, core)) {  // checks the core's times
+      if (task_.settings().enforce_wcet)
+        binding.budgets_ns.push_back(state.wcet_enforced ? state.wcet_ns : 0);
+    }
     return binding;
   }
   throw Error(

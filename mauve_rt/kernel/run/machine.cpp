@@ -21,6 +21,16 @@ void check_locks(int held_before) {
   throw std::logic_error("a lock is still held at the end of the state");
 }
 
+/// Of all bounds and budgets; 0: there is none.
+time_ns_t smallest_bound_ns(const FsmBase& fsm, const CoreBinding* core) noexcept {
+  time_ns_t smallest_ns = fsm.smallest_bound_ns();
+  if (core == nullptr) return smallest_ns;
+  for (const time_ns_t budget_ns : core->budgets_ns) {
+    if (budget_ns != 0 && (smallest_ns == 0 || budget_ns < smallest_ns)) smallest_ns = budget_ns;
+  }
+  return smallest_ns;
+}
+
 }  // namespace
 
 void Machine::set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) noexcept {
@@ -29,7 +39,7 @@ void Machine::set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_
   period_ns_.store(period_ns, std::memory_order_relaxed);
   context_.period_ns.store(period_ns, std::memory_order_relaxed);  // relaxed: a lone number
   // After a wait for an event nothing can be foreseen: the thread wakes the watchdog itself.
-  wait_bound_ns_.store(fsm.is_sporadic() ? 0 : fsm.smallest_bound_ns(), std::memory_order_relaxed);
+  wait_bound_ns_.store(fsm.is_sporadic() ? 0 : smallest_bound_ns(fsm, core), std::memory_order_relaxed);
 }
 
 time_ns_t Machine::join(time_ns_t epoch_ns) noexcept {
@@ -136,24 +146,37 @@ Machine::Entered Machine::enter_next() {
 /// False when it timed out before it began or ended.
 bool Machine::execute(const State& state) {
   const time_ns_t began = boundary_ns_;
-  if (state.max_execution_ns != 0 && !begin_execution(began, state.max_execution_ns)) return false;
+  const time_ns_t budget_ns = core_->budget_ns(state.index);
+  const bool is_watched = state.max_execution_ns != 0 || budget_ns != 0;
+  const time_ns_t limit_ns = state.max_execution_ns != 0 ? state.max_execution_ns : kForever;
+  if (is_watched && !begin_execution(began, limit_ns, budget_ns)) return false;
   present_.tell({.since_ns = began, .bound_ns = state.max_execution_ns, .name = state.trace_id});
   trace_at(began, TraceKind::state_begin, state.trace_id);
   const auto& methods = fsm_->methods();
   MAUVE_AUDIT(state.action < methods.size());
   const auto held_before = PiMutex::held_by_this_thread();  // not 0 where a simulated neighbour kept a lock
+  const time_ns_t cpu_began_ns = budget_ns != 0 ? begin_budget(budget_ns) : 0;
   methods[state.action].run(*core_);
   next_ = successor(state);
   clock_->spend(state.simulated_execution_ns);
+  const time_ns_t cpu_ns = budget_ns != 0 ? clock_->cpu_now_ns() - cpu_began_ns : 0;
   boundary_ns_ = clock_->now_ns();
-  const bool had_timed_out = state.max_execution_ns != 0 && !end_execution();
+  const bool had_timed_out = is_watched && !end_execution();
   trace_at(boundary_ns_, TraceKind::state_end, state.trace_id);
   state.execution_time->record(boundary_ns_ - began);
   check_locks(held_before);
   if (had_timed_out) return false;
+  if (cpu_ns > budget_ns) throw OverBound(budget_ns, cpu_ns);
   if (state.max_execution_ns != 0 && boundary_ns_ - began > state.max_execution_ns)
     throw OverBound(state.max_execution_ns);
   return true;
+}
+
+/// The last of what comes before the state itself: the kernel's work for it is not the state's. Returns the CPU time so far.
+time_ns_t Machine::begin_budget(time_ns_t budget_ns) noexcept {
+  const time_ns_t began_ns = clock_->cpu_now_ns();
+  execution_.set_cpu_end(later_by(began_ns, budget_ns));
+  return began_ns;
 }
 
 /// Where the state leads: where its first transition does whose guard holds.
@@ -261,9 +284,9 @@ void Machine::tell_late_response() noexcept {
       [&](TaskListener& listener) { listener.on_late_response(boundary_ns_, boundary_ns_ - clock_ns()); });
 }
 
-bool Machine::begin_execution(time_ns_t began_ns, time_ns_t limit_ns) noexcept {
-  if (!execution_.begin(began_ns, limit_ns)) return false;
-  if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns));
+bool Machine::begin_execution(time_ns_t began_ns, time_ns_t limit_ns, time_ns_t budget_ns) noexcept {
+  if (!execution_.begin(began_ns, limit_ns, budget_ns)) return false;
+  if (watchdog_ != nullptr) watchdog_->expect_end(ExecutionWord::end_ns(began_ns, limit_ns, budget_ns));
   return true;
 }
 

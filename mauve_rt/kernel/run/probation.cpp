@@ -220,6 +220,7 @@ bool Probation::note_fault(const FaultNote& fault) noexcept {
     MAUVE_AUDIT(fault_ == nullptr);  // so the assignment frees nothing
     MAUVE_RT_TRUSTED(fault_ = fault.what);
     fault_bound_ns_ = fault.bound_ns;
+    fault_cpu_ns_ = fault.cpu_ns;
     fault_where_ = fault.where;
     find({.cause = cause, .instant_ns = task.entered_ns()});
   }
@@ -418,6 +419,10 @@ std::string Probation::reason() const {
       return "fault: " + (fault_ != nullptr ? *fault_ : std::string("an execution over its bound")) +
              " in state " + TraceNames::word(fault_where_);
     case ProbationCause::over_declared:
+      if (fault_cpu_ns_ != 0) {
+        const FaultNote note{.bound_ns = fault_bound_ns_, .cpu_ns = fault_cpu_ns_, .where = fault_where_};
+        return "execution over declared: " + note.over_budget() + at;
+      }
       return "execution over declared: state " + TraceNames::word(fault_where_) + " ran longer than its " +
              std::to_string(fault_bound_ns_ / us_to_ns(1)) + " us" + at;
     case ProbationCause::overrun:

@@ -3,6 +3,8 @@
 #include "mauve_rt/run/task.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cstdio>
 #include <cstring>
 
 #include "mauve_rt/base/contract.hpp"
@@ -32,13 +34,25 @@ std::size_t ring_capacity(time_ns_t period_ns) {
   return std::max(TraceRing::kDefaultCapacity, static_cast<std::size_t>(std::min(wanted, kMost)));
 }
 
+std::string in_ms(time_ns_t time_ns) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.9g ms", static_cast<double>(time_ns) / 1e6);
+  return text.data();
+}
+
 std::string over_bound(const FaultNote& note) {
+  if (note.cpu_ns != 0) return note.over_budget();
   const std::string what = note.is_visit ? "adopt or take of its new part" : "the state";
   const time_ns_t declared_ns = note.is_visit ? note.bound_ns - Commit::kPatience : note.bound_ns;
   return what + " ran longer than its declared " + std::to_string(declared_ns / us_to_ns(1)) + " us";
 }
 
 }  // namespace
+
+std::string FaultNote::over_budget() const {
+  return "state " + TraceNames::word(where) + " used " + in_ms(cpu_ns) + " of CPU time, and its wcet_ns is " +
+         in_ms(bound_ns);
+}
 
 std::string_view to_string(ComponentState state) noexcept {
   switch (state) {

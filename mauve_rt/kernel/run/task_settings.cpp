@@ -26,13 +26,13 @@ void check_setting(const TaskSetting& setting, const SettingValue& value, const 
     check_number(setting, *number, component);
   } else if (const auto* numbers = std::get_if<std::vector<int>>(&value)) {
     for (const int each : *numbers) check_number(setting, each, component);
-  } else if (const auto& word = std::get<std::string>(value);
-             std::ranges::find(setting.choices, word) == setting.choices.end()) {
+  } else if (const auto* word = std::get_if<std::string>(&value);
+             word != nullptr && std::ranges::find(setting.choices, *word) == setting.choices.end()) {
     throw Error(ErrorCode::invalid_argument, "a setting of the task is none of those there are",
                 {.component = component,
                  .element = std::string(setting.name),
                  .expected = join(setting.choices),
-                 .found = word});
+                 .found = *word});
   }
 }
 
@@ -71,6 +71,7 @@ void check_states(const std::vector<DeclaredState>& states, const std::string& c
 std::string to_string(const SettingValue& value) {
   if (const auto* number = std::get_if<std::int64_t>(&value)) return std::to_string(*number);
   if (const auto* word = std::get_if<std::string>(&value)) return *word;
+  if (const auto* is_set = std::get_if<bool>(&value)) return *is_set ? "true" : "false";
   std::vector<std::string> words;
   for (const int number : std::get<std::vector<int>>(value)) words.push_back(std::to_string(number));
   return join(words);

@@ -20,7 +20,7 @@ void Task::run_guarded(Steps&& steps) noexcept {
   try {
     steps();
   } catch (const OverBound& failure) {
-    park_faulted(nullptr, failure.bound_ns);
+    park_faulted(nullptr, failure.bound_ns, failure.cpu_ns);
   } catch (const std::exception& failure) {
     PiMutex::let_go_of_all_but(held_before);
     park_faulted(failure.what());
@@ -168,11 +168,12 @@ void Task::park_stopped() noexcept {
   park(ComponentState::stopped);
 }
 
-void Task::park_faulted(const char* what, time_ns_t bound_ns) noexcept {
+void Task::park_faulted(const char* what, time_ns_t bound_ns, time_ns_t cpu_ns) noexcept {
   if (!machine_.leave()) return park_timed_out();
   if (bound_ns != 0) tell_over_declared();
   FaultNote note{.what = what != nullptr ? std::make_shared<const std::string>(what) : nullptr,
                  .bound_ns = bound_ns,
+                 .cpu_ns = cpu_ns,
                  .where = machine_.state_name(),
                  .when_ns = clock().now_ns()};
   swap_fault(note);

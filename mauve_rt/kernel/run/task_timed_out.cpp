@@ -11,12 +11,26 @@ namespace mauve {
 
 bool Task::time_out_if_over(time_ns_t now_ns) noexcept {
   const auto execution = machine_.execution().look();
-  if (!execution || !execution->is_over(now_ns) || !machine_.execution().time_out(*execution)) return false;
-  time_out_note_.bound_ns = execution->limit_ns;
+  if (!execution) return false;
+  const time_ns_t left_ns =
+      execution->may_be_over_budget(now_ns) ? execution->cpu_left_ns(thread_.cpu_now_ns()) : 0;
+  const bool is_over_budget = left_ns < 0;
+  if (!is_over_budget && !execution->is_over(now_ns)) return false;
+  if (!machine_.execution().time_out(*execution)) return false;
+  time_out_note_.bound_ns = is_over_budget ? execution->budget_ns : execution->limit_ns;
+  time_out_note_.cpu_ns = is_over_budget ? execution->budget_ns - left_ns : 0;
   time_out_note_.is_visit = (slot_.load(std::memory_order_acquire) & kSlot) == kBusy;
   time_out_note_.when_ns = now_ns;
   carry_out_time_out();
   return true;
+}
+
+time_ns_t Task::earliest_excess_ns(time_ns_t now_ns) const noexcept {
+  const auto execution = machine_.execution().look();
+  if (!execution || !execution->may_be_over_budget(now_ns)) return machine_.earliest_excess_ns();
+  // Kept from its processor, or asleep, it has CPU time left: it takes as long at least to use that up.
+  const time_ns_t used_up_ns = later_by(now_ns, execution->cpu_left_ns(thread_.cpu_now_ns()));
+  return std::min(used_up_ns, ExecutionWord::end_ns(execution->began_ns, execution->limit_ns));
 }
 
 bool Task::time_out(std::string what, time_ns_t now_ns) {

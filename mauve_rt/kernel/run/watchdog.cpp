@@ -107,7 +107,7 @@ time_ns_t Watchdog::look(time_ns_t now_ns) noexcept {
     const LockGuard lock(tasks_mutex_);
     for (Task* task : tasks_) {
       task->time_out_if_over(now_ns);
-      earliest_ns = std::min(earliest_ns, task->earliest_excess_ns());
+      earliest_ns = std::min(earliest_ns, task->earliest_excess_ns(now_ns));
     }
   }
   // At the soonest look it comes anyway: nobody needs to wake it.

@@ -25,6 +25,24 @@ TEST(ExecutionWord, TimesOutOnlyTheExecutionThatWasLookedAt) {
   EXPECT_FALSE(word.look()) << "nothing is left to time out";
 }
 
+TEST(ExecutionWord, ABudgetIsUsedUpByCpuTimeAlone) {
+  ExecutionWord word;
+  word.begin(100, 50, 10);
+  const auto begun = word.look();
+  ASSERT_TRUE(begun);
+  EXPECT_EQ(110, begun->end_ns()) << "before that it cannot be over it";
+  EXPECT_FALSE(begun->may_be_over_budget(110));
+  EXPECT_TRUE(begun->may_be_over_budget(111));
+  EXPECT_EQ(10, begun->cpu_left_ns(7'000)) << "its thread has yet to read its CPU clock";
+  word.set_cpu_end(7'010);
+  EXPECT_EQ(3, word.look()->cpu_left_ns(7'007));
+  EXPECT_EQ(-1, word.look()->cpu_left_ns(7'011));
+  EXPECT_TRUE(word.end());
+  word.begin(200, 50);
+  EXPECT_EQ(250, word.look()->end_ns());
+  EXPECT_FALSE(word.look()->may_be_over_budget(s_to_ns(1))) << "it has none";
+}
+
 TEST(ExecutionWord, WhoRemovesAndWhoComesBackDecideByTheSameWord) {
   ExecutionWord word;
   word.begin(100, 10);

@@ -145,6 +145,21 @@ TEST_F(MachineByHand, ThrowsAtTheEndOfAStateOverItsBound) {
   }
 }
 
+TEST_F(MachineByHand, ABudgetIsForeseenAndComparedAtTheEnd) {
+  make_periodic(ms_to_ns(4));
+  binding.budgets_ns = {ms_to_ns(3), 0};
+  machine.set_parts(*fsm, &binding, fsm->period_ns());
+  machine.start(kPeriod);
+  EXPECT_EQ(kPeriod + ms_to_ns(3), machine.earliest_excess_ns()) << "sooner than the bound";
+  try {
+    step();
+    FAIL() << "it was over its budget";
+  } catch (const OverBound& failure) {
+    EXPECT_EQ(ms_to_ns(3), failure.bound_ns);
+    EXPECT_EQ(ms_to_ns(4), failure.cpu_ns);
+  }
+}
+
 TEST_F(MachineByHand, SaysWhenItsStateTimedOut) {
   make_periodic(ms_to_ns(4));
   core.work = [this] {

@@ -126,6 +126,28 @@ TYPED_TEST(Probations, AnExecutionOverItsBoundPutsTheOldCoreBack) {
   this->host.until([&] { return this->newest() == 1.0; }, "its outputs to be open again");
 }
 
+TYPED_TEST(Probations, AnExecutionOverItsEnforcedWorstCasePutsTheOldCoreBack) {
+  constexpr time_ns_t kBudget = ms_to_ns(20);
+  Component& component =
+      this->add_trial("c", {.enforce_wcet = true, .states = {{.name = "Run", .wcet_ns = kBudget}}});
+  this->deploy();
+  const auto seen = this->put_in(
+      [&](TrialCore&, int run) {
+        if (run != 2) return;
+        component.task().clock().spend(2 * kBudget);  // of virtual time
+        const time_ns_t until_ns = thread_cpu_now_ns() + (TestFixture::is_virtual ? 0 : 2 * kBudget);
+        while (thread_cpu_now_ns() < until_ns) {
+        }
+      },
+      {.on_fault = false, .on_over_declared = true});
+  this->wait_verdict(Verdict::reverted);
+  this->expect_old_core_runs_on(component);
+  EXPECT_EQ(2, seen->runs);
+  EXPECT_EQ(Cause::over_declared, this->record().cause);
+  EXPECT_THAT(this->record().reason, HasSubstr("execution over declared: state Run used "));
+  EXPECT_THAT(this->record().reason, HasSubstr(" of CPU time, and its wcet_ns is 20 ms"));
+}
+
 TYPED_TEST(Probations, AValueThatBreaksALimitIsNotWritten) {
   Component& component = this->add_trial();
   this->deploy();

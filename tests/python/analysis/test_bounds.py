@@ -13,8 +13,9 @@ from mauve_rt.analysis.machines import ExecutionTime, Hold, Machine
 from mauve_rt.analysis.obstacles import assumptions_about
 from mauve_rt.analysis.offsets import Grid
 from mauve_rt.analysis.plan import bounds_during, subjects_during
+from mauve_rt.analysis.study import Surroundings, study
 from mauve_rt.analysis.threads import machines_of
-from mauve_rt.model.threads import ThreadInfo
+from mauve_rt.model.threads import ThreadInfo, ThreadList
 
 
 def loop(name: str, cost_ms: float, period_ms: int, **told: object) -> Machine:
@@ -171,6 +172,60 @@ def test_a_caller_that_a_lock_may_block_leaves_those_below_it_without_a_bound() 
     assert found["above"].response_ns == 1 * MS
     elsewhere = replace(below, cpus=(1,))
     assert bounds(caller, elsewhere, holder)["below"].response_ns == 10 * MS
+
+
+def enforced(name: str, priority: int, *, bound_ms: float = 0.0) -> Machine:
+    return machine(
+        execution("Run", "Pause", wcet_ms=1, bound_ms=bound_ms, initial=True, enforced=True),
+        wait("Pause", "Run", ms=20),
+        name=name,
+        priority=priority,
+    )
+
+
+def test_an_enforced_worst_case_counts_with_its_overrun() -> None:
+    """Until the watchdog looks again, wakes up and has looked: others keep their bounds."""
+    watchdog = ThreadInfo("watchdog", 99, wcet_ns=MS // 10, min_interarrival_ns=MS)
+    surroundings = Surroundings(threads=ThreadList(MS // 5, 0, (watchdog,)))
+    assert surroundings.overrun_ns == MS + MS // 10 + MS // 5
+    high = enforced("high", 60)
+    low = loop("low", 2, 20)
+    found = study([high, low], surroundings)
+    jobs = {subject.name: {job.cost_ns for job in subject.task.jobs} for subject in found.subjects}
+    assert jobs["high"] == {MS + surroundings.overrun_ns}
+    assert jobs["low"] == {2 * MS}, "it is only declared"
+    (subject,) = (each for each in found.subjects if each.name == "high")
+    assert subject.machine.states == high.states, "runs and wall-clock bounds take the worst case itself"
+    without = study([high, low], Surroundings(threads=ThreadList(MS // 5, 0, ())))
+    assert (found.bounds["low"].response_ns or 0) > (without.bounds["low"].response_ns or 0) + MS
+
+
+def test_a_wall_clock_bound_need_not_have_room_for_the_overrun() -> None:
+    subject = Subject.of(enforced("c", 50, bound_ms=1.5), overrun_ns=MS)
+    assert {job.cost_ns for job in subject.task.jobs} == {MS * 3 // 2}
+    assert bounds_of([subject])["c"].too_long == ()
+
+
+def test_a_verdict_says_whose_worst_cases_are_enforced() -> None:
+    guarded = machine(
+        execution("Run", "Pause", wcet_ms=1, initial=True, enforced=True),
+        wait("Pause", "Run", "Pause", ms=20, wcet_ms=0.1),
+        name="guarded",
+    )
+    half = machine(
+        execution("Run", "More", wcet_ms=1, initial=True, enforced=True),
+        execution("More", "Pause", bound_ms=1),
+        wait("Pause", "Run", ms=20),
+        name="half",
+    )
+    said = [*assumptions_about([loop("one", 1, 20), enforced("two", 50), guarded, half])]
+    assert said[:3] == [
+        "each execution of one, half ends within its declared time (only max_execution_ns is enforced)",
+        "each execution of two, guarded uses at most its wcet_ns of CPU time (enforced), and never sleeps",
+        "the guards of waits of guarded end within their declared time (not enforced)",
+    ]
+    assert "only max_execution_ns" not in " ".join(assumptions_about([enforced("two", 50)]))
+    assert "(enforced)" not in " ".join(assumptions_about([loop("one", 1, 20)]))
 
 
 def test_of_whom_a_lock_may_block_for_an_unknown_time_nothing_is_proved() -> None:

@@ -1,7 +1,7 @@
 """The time of a state as the analysis takes it: the worst case, else the bound that the watchdog enforces."""
 
 import pytest
-from analysis_machines import connected, execution, machine
+from analysis_machines import MS, connected, execution, machine
 
 from mauve_rt.analysis.machines import ExecutionTime, Hold, State
 
@@ -23,6 +23,25 @@ def test_a_state_of_a_bag_of_an_earlier_version_has_a_bound_only() -> None:
     told = execution("Act", "Pause", bound_ms=5)
     del told.wcet_ns
     assert State.of(told).time == ExecutionTime(5_000_000, "declared (its bound)")
+
+
+@pytest.mark.parametrize(
+    ("enforced", "bound_ms", "expected_ms"),
+    [
+        (False, 0, 2),
+        (True, 0, 3.5),
+        (True, 9, 3.5),
+        (True, 3, 3),  # the watchdog ends it there
+        (True, 2, 2),
+    ],
+)
+def test_an_execution_overruns_an_enforced_worst_case(
+    *, enforced: bool, bound_ms: int, expected_ms: float
+) -> None:
+    state = State.of(execution("Act", "Pause", wcet_ms=2, bound_ms=bound_ms, enforced=enforced))
+    assert state.time.ns == 2 * MS
+    assert state.overrunning(MS * 3 // 2).time.ns == expected_ms * MS
+    assert state.is_watched == (enforced or bound_ms > 0)
 
 
 def test_the_locks_of_a_component_are_those_of_connected_resources() -> None:

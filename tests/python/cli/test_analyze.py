@@ -159,8 +159,25 @@ def test_what_is_schedulable_is_so_under_conditions(analyze: Analyze) -> None:
     status, out, err = analyze(PAIR)
     assert (status, err) == (0, "")
     assert "\nschedulable: every component meets its deadline, if\n" in out
-    assert "  each execution ends within its declared time (only max_execution_ns is enforced)\n" in out
+    declared = "ends within its declared time (only max_execution_ns is enforced)\n"
+    assert f"  each execution of quick, slow {declared}" in out
     assert "  no component faults, stops or is changed, and no rule of the executor acts\n" in out
+
+
+def test_an_enforced_worst_case_costs_the_overrun_and_is_said_to_be_enforced(analyze: Analyze) -> None:
+    text = PAIR.replace("priority: 40,", "priority: 40, enforce_wcet: true,").replace("13950000", "9000000")
+    status, out, err = analyze(text)
+    assert (status, err) == (0, "")
+    assert "  Count: 3.000 ms, declared, enforced\n" in out
+    assert "  job the start -> Count -> Pause: at most 4.042 ms, " in out, "1 ms, and a look of the watchdog"
+    assert "thread 'watchdog': any CPU, priority 99, at most 0.042 ms every 1.000 ms\n" in out
+    declared = "ends within its declared time (only max_execution_ns is enforced)\n"
+    assert f"  each execution of slow {declared}" in out
+    assert "an execution up to 1.042 ms of CPU time above its enforced wcet_ns\n" in out
+    enforced = "uses at most its wcet_ns of CPU time (enforced), and never sleeps\n"
+    assert f"  each execution of quick {enforced}" in out
+    _, out, _ = analyze(text.replace("enforce_wcet: true", "enforce_wcet: false"))
+    assert f"  each execution of quick, slow {declared}" in out
 
 
 SHARED = (

@@ -99,6 +99,13 @@ def test_times_of_one_core_are_not_those_of_another(plan: Plan) -> None:
     assert "  low: its new core declares no budget_ns of adopt and take: declare it\n" in out
 
 
+def test_an_enforced_worst_case_of_the_file_is_that_of_each_core(plan: Plan) -> None:
+    enforced = TIMED.replace("priority: 30,", "priority: 30, enforce_wcet: true,")
+    out = plan(enforced, "- {kind: replace_core, target: low, name: executor_tests/Backwards}\n")[1]
+    assert "no time is known" not in out
+    assert "  low: its new core declares no budget_ns of adopt and take: declare it\n" in out
+
+
 def test_one_that_is_added_delays_those_below(plan: Plan) -> None:
     part = (
         "{shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm, "

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from mauve_msgs.msg import ComponentInfo, HeldElement, JobBound, PortInfo, ResourceInfo
+from mauve_msgs.msg import ComponentInfo, HeldElement, JobBound, PortInfo, ResourceInfo, StateInfo
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli.list_view import STATES, print_components
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
@@ -172,6 +172,17 @@ def test_a_state_that_lasts_is_told_against_period_and_bound() -> None:
         "stuck: hung: state Act has lasted 2.5 s (period 0.01 s, hung from 1 s on)",
         "starved: hung: wait Act is 2.5 s past its instant (period 0.01 s, hung from 1 s on)",
     ]
+
+
+def test_enforced_worst_cases_are_named() -> None:
+    states = [
+        StateInfo(name="Run", wcet_enforced=True),
+        StateInfo(name="More", wcet_enforced=True),
+        StateInfo(name="Pause", is_wait=True),
+    ]
+    parts = [ComponentInfo(name="control", states=states), ComponentInfo(name="other", states=states[2:])]
+    told = [line for line in _printed(ListComponents.Response(components=parts)) if "enforced" in line]
+    assert told == ["control: wcet_ns is enforced of Run, More"]
 
 
 def test_mirrors_of_a_resource() -> None:

@@ -13,7 +13,10 @@ from mauve_rt.model.schema import ComponentModel
 IN_FILES = {
     each.name: (key, each) for key, each in ComponentModel.settings.items() if isinstance(each, KernelSetting)
 }
-NUMBERS = sorted(name for name, told in TASK_SETTINGS.items() if not told.choices)
+NUMBERS = sorted(
+    name for name, told in TASK_SETTINGS.items() if not (told.choices or isinstance(told.default, bool))
+)
+FLAGS = sorted(name for name, told in TASK_SETTINGS.items() if isinstance(told.default, bool))
 
 
 def add(**settings: Any) -> str:
@@ -64,6 +67,17 @@ def test_a_file_and_the_kernel_take_the_same_numbers(name: str):
         assert (faults, setting.to_kernel(read)) == ([], given)
 
 
+@pytest.mark.parametrize("name", FLAGS)
+@pytest.mark.parametrize("value", [True, False])
+def test_a_file_and_the_kernel_take_the_same_flags(name: str, *, value: bool):
+    setting = IN_FILES[name][1]
+    faults: Faults = []
+    assert setting.to_kernel(setting.read(value, (name,), faults)) is value
+    assert f"  setting {name} {str(value).lower()}\n" in add(**{name: value})
+    setting.read(1, (name,), faults)
+    assert len(faults) == 1
+
+
 @pytest.mark.parametrize(
     ("settings", "error", "words"),
     [
@@ -75,6 +89,7 @@ def test_a_file_and_the_kernel_take_the_same_numbers(name: str):
         ),
         ({"stack_bytes": 1.5}, TypeError, "stack_bytes"),
         ({"cpus": 1}, TypeError, "cpus"),
+        ({"enforce_wcet": 1}, TypeError, "enforce_wcet: found <class 'int'>"),
         ({"colour": 1}, TypeError, "no argument 'colour'"),
     ],
 )

@@ -78,6 +78,24 @@ def test_an_execution_takes_what_is_declared_and_its_bound_is_none(
 
 
 @pytest.mark.parametrize(
+    ("simulated_ms", "fault"),
+    [(1, ""), (2, "state Act used 2 ms of CPU time, and its wcet_ns is 1 ms (in state Act, at ")],
+)
+def test_an_enforced_worst_case_faults_what_takes_longer(built: Stage, simulated_ms: int, fault: str):
+    states = {"Act": {"simulated_execution_ns": simulated_ms * MS}}
+    built.architecture.add_component("c", CountShell, CountCore, CostlyFsm, states=states, enforce_wcet=True)
+    built.architecture.configure()
+    simulation = Simulation()
+    simulation.add(built.architecture)
+    simulation.deploy()
+    simulation.run_until(simulation.epoch_ns() + 100 * MS)
+    (told,) = built.architecture.components()
+    assert (told.state, told.fault[: len(fault) or None]) == ("FAULTED" if fault else "RUNNING", fault)
+    assert {state.name for state in told.states if state.wcet_enforced} == {"Act"}
+    simulation.shutdown()
+
+
+@pytest.mark.parametrize(
     ("wcet_ns", "expected"),
     [
         (

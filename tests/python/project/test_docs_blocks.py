@@ -45,6 +45,7 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
     },
     "docs/concepts/timing_proof.md": {
         "control: {..., deadline_ns:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "control: {..., enforce_wcet:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
     },
     "docs/howto/ci_for_your_package.md": {
         "def test_ten_beats_in_a_second": (f"{HOWTO}the_test_in_virtual_time_passes",),

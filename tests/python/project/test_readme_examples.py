@@ -91,6 +91,9 @@ def test_the_pieces_of_architecture_files_are_accepted(tmp_path: Path) -> None:
     states = _indented("control: {..., deadline_ns").replace("...", "shell: a/A, core: a/A, fsm: a/A")
     file.write_text(f"mauve: 1\ncomponents:\n  {states}", encoding="utf-8")
     assert load_architecture(file).components["control"].states["Control"].wcet_ns == 200_000
+    enforced = _indented("control: {..., enforce_wcet").replace("...", "shell: a/A, core: a/A, fsm: a/A")
+    file.write_text(f"mauve: 1\ncomponents:\n  {enforced}", encoding="utf-8")
+    assert load_architecture(file).components["control"].enforce_wcet
     sender = re.search(r"`(executor: {sender: .*?}})`", README, re.DOTALL)
     assert sender is not None
     file.write_text(f"{COMPONENTS}{' '.join(sender[1].split())}\n", encoding="utf-8")

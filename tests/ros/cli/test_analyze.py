@@ -98,7 +98,7 @@ def test_a_file_a_node_and_a_bag_tell_one_model(  # noqa: PLR0915 - one executor
     words = ["--budget-from", str(bag), "--margin", str(MARGIN), "--write"]
     done = subprocess.run([*command, *words], capture_output=True, text=True, check=False, timeout=200)
     assert done.returncode == NOT_PROVED, done.stderr
-    assert "2 times written as wcet_ns; nothing enforces them" in done.stderr
+    assert "2 times written as wcet_ns; enforce_wcet enforces them" in done.stderr
     after = architecture.read_text(encoding="utf-8")
     entry = f"states: {{Count: {{wcet_ns: {state['time_ns']}}}}},  # {state['origin']}\n"
     assert entry in after

@@ -510,6 +510,7 @@ void wake_one(const void* address) noexcept {
 
 time_ns_t now_ns() noexcept { return all().now_ns; }
 time_ns_t cpu_ns() noexcept { return self().cpu_ns; }
+time_ns_t cpu_ns(const Thread& thread) noexcept { return thread.cpu_ns; }
 time_ns_t kept_ns() noexcept { return self().kept_ns; }
 
 Thread* start(const NewThread& made, int& error) {

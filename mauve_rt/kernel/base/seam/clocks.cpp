@@ -9,7 +9,8 @@ namespace {
 
 time_ns_t read_clock(clockid_t clock) MAUVE_RT {
   timespec now{};
-  MAUVE_RT_TRUSTED(clock_gettime(clock, &now));  // reads a page of the system's, and makes no call of it
+  MAUVE_RT_TRUSTED(
+      clock_gettime(clock, &now));  // reads a page of the system's; of CPU time a call that waits for nothing
   return to_ns(now);
 }
 

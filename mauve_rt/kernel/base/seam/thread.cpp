@@ -6,6 +6,7 @@
 #include <cerrno>
 
 #include "base/prefault.hpp"
+#include "base/seam/timespec.hpp"
 
 namespace mauve {
 
@@ -56,8 +57,16 @@ int Thread::start(const ThreadSettings& settings, void* (*entry)(void*), void* a
     attributes.set_priority(0);
     result = pthread_create(&handle_, &attributes.value, entry, argument);
   }
-  if (result == 0) pthread_setname_np(handle_, name.c_str());
-  return result;
+  if (result != 0) return result;
+  pthread_setname_np(handle_, name.c_str());
+  pthread_getcpuclockid(handle_, &cpu_clock_);
+  return 0;
+}
+
+time_ns_t Thread::cpu_now_ns() const noexcept {
+  timespec now{};
+  MAUVE_RT_TRUSTED(clock_gettime(cpu_clock_, &now));  // a call of the system that waits for nothing
+  return to_ns(now);
 }
 
 ThreadFacts Thread::facts() const {

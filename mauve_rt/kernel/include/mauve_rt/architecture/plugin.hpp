@@ -50,7 +50,7 @@ consteval PluginAbi plugin_abi() {
 
 /// Facts about a core that its class does not say.
 struct CoreOptions {
-  CoreTimes wcet_ns{};  // worst-case execution times of its methods, for the timing analysis; not enforced
+  CoreTimes wcet_ns{};  // worst-case execution times of its methods, enforced where enforce_wcet is set
 };
 
 /// Entries of a registry that others have taken the place of, and the names that there were not before. Keep it as long as

@@ -41,6 +41,8 @@ class Clock {
   /// Returns true when the instant was reached. Interrupted sleeps (EINTR) are resumed.
   virtual bool sleep_until(time_ns_t instant_ns, const Atomic<std::uint32_t>& word,
                            std::uint32_t expected) const MAUVE_RT = 0;
+  /// The CPU time that the calling thread has used, from any origin; where time is simulated, the time that passes by spend(). [rt]
+  virtual time_ns_t cpu_now_ns() const MAUVE_RT { return now_ns(); }
   /// An execution state has ended that takes so much time where time is simulated: that passes by it. [rt]
   virtual void spend(time_ns_t /*simulated_ns*/) const MAUVE_RT {}
   /// A simulated task waits for another instant now, or for none. [rt]
@@ -53,6 +55,7 @@ class Clock {
 class MonotonicClock final : public Clock {
  public:
   time_ns_t now_ns() const noexcept override;
+  time_ns_t cpu_now_ns() const noexcept override { return thread_cpu_now_ns(); }
   bool sleep_until(time_ns_t instant_ns, const Atomic<std::uint32_t>& word,
                    std::uint32_t expected) const noexcept override;
   /// The process's one instance. [rt]

@@ -14,7 +14,7 @@ struct DeclaredState {
   std::string name{};
   std::optional<time_ns_t> max_execution_ns{};        // the bound that the watchdog enforces; > 0
   std::optional<time_ns_t> simulated_execution_ns{};  // what it takes in virtual time; >= 0
-  std::optional<time_ns_t> wcet_ns{};                 // worst case for the timing analysis; not enforced; > 0
+  std::optional<time_ns_t> wcet_ns{};                 // worst case; enforced where enforce_wcet is set; > 0
   bool operator==(const DeclaredState&) const = default;
 };
 

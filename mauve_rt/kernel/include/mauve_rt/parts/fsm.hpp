@@ -25,15 +25,18 @@ namespace mauve {
 
 /// A core as one fsm sees it: resolved before the core is put in, so that putting it in is a pointer swap.
 struct CoreBinding {
-  void* object{nullptr};          // of the fsm's core type, when it is a C++ core
-  DynamicCore* dynamic{nullptr};  // otherwise
-  std::vector<int> method_slots;  // of dynamic, by method number
-  const CoreBase* core{nullptr};  // the same, given by the component
+  void* object{nullptr};                // of the fsm's core type, when it is a C++ core
+  DynamicCore* dynamic{nullptr};        // otherwise
+  std::vector<int> method_slots;        // of dynamic, by method number
+  const CoreBase* core{nullptr};        // the same, given by the component
+  std::vector<time_ns_t> budgets_ns{};  // of CPU time, by state, 0: none; empty: nothing enforces worst cases
 
   /// Whether the fsm can run the core. [rt]
   bool is_bound() const MAUVE_RT { return object != nullptr || dynamic != nullptr; }
   /// Whether the core is configured too: a component may start with it. [non-rt]
   bool is_ready() const noexcept { return is_bound() && core != nullptr && core->is_configured(); }
+  /// Of a state by its index; 0: none. [rt]
+  time_ns_t budget_ns(std::size_t state) const MAUVE_RT { return budgets_ns.empty() ? 0 : budgets_ns[state]; }
 };
 
 /// A method of the core, by name and by pointer, whichever the core at hand needs.
@@ -146,6 +149,7 @@ struct DescribedState {
   std::string event_port{};           // of an event wait
   std::string wcet_core{};  // the core that declares wcet_ns; empty: the architecture file or the fsm does
   std::vector<std::string> methods_without_wcet{};  // of a core that declares times of others: wcet_ns is 0
+  bool wcet_enforced{false};  // an execution that uses more CPU time than wcet_ns faults its component
 };
 
 /// Gives each state without a worst case the core's: the times of its action, which a wait lacks, and of the guards that are

@@ -438,6 +438,9 @@ class Component final : public Configurable {
   CoreBinding require_binding(CoreBase& core, const FsmBase& fsm) const;
   /// The fsm's states, with the core's worst cases. Throws Error (out_of_range): one is above the state's bound.
   std::vector<DescribedState> states_of(const FsmBase& fsm, const CoreBase& core) const;
+  /// The times of a core, and which worst cases are enforced.
+  void add_worst_cases(std::vector<DescribedState>& states, const std::string& core,
+                       const CoreTimes& times) const;
   const ShownCore* keep_shown(const CoreBase& core);
   void bind_fsm(FsmBase& fsm, Shell& shell) const;
   void require_declared_states(const FsmBase& fsm) const;

@@ -2,6 +2,7 @@
 // Who ends an execution: the thread that runs it, or who times it out. One atomic word decides.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <optional>
 
@@ -12,10 +13,11 @@
 
 namespace mauve {
 
-/// The executions of one component, one after another. A watched one has a number of its own and a bound.
+/// The executions of one component, one after another. A watched one has a number of its own, and a bound, a budget of CPU time,
+/// or both.
 ///
-/// The component's thread enters its fsm, leaves it, and in between begins and ends what is watched: a state with a bound,
-/// and an adopt or take of a commit. The watchdog, or a commit's requester, times out exactly the watched execution that is over
+/// The component's thread enters its fsm, leaves it, and in between begins and ends what is watched: a state with a bound or a
+/// budget, and an adopt or take of a commit. The watchdog, or a commit's requester, times out exactly the watched execution that is over
 /// its bound; a stop by force times out all that the thread does between entering and leaving. All change the word by
 /// compare-and-exchange: who comes first has decided, and the other one finds so. The thread finds out where it ends the
 /// watched execution, begins the next one, or leaves the fsm. So a state without a bound costs nothing here; who times it
@@ -44,20 +46,36 @@ namespace mauve {
 /// |           | (Watchdog::wake_before_); else acq_rel: who changes it sees what the one before did                  |
 /// | began_ns_ | release: who sees the new one, sees the end of the execution before, and then times out nothing       |
 /// | limit_ns_ | likewise                                                                                             |
+/// | budget_ns_| likewise                                                                                             |
+/// | cpu_end_ns_| likewise; of an execution that is under way the thread sets it, once it has read its CPU clock      |
 class ExecutionWord {
  public:
   /// An execution as somebody saw it.
   struct Look {
     std::uint32_t word;
     time_ns_t began_ns;
-    time_ns_t limit_ns;
+    time_ns_t limit_ns;   // kForever: it has a budget alone
+    time_ns_t budget_ns;  // of CPU time; 0: none
+    time_ns_t
+        cpu_end_ns;  // what the thread's CPU clock shows when the budget is used up; kForever: it has yet to be read
 
     /// [rt]
     bool is_over(time_ns_t now_ns) const MAUVE_RT { return now_ns - began_ns > limit_ns; }
-    time_ns_t end_ns() const MAUVE_RT { return ExecutionWord::end_ns(began_ns, limit_ns); }
+    /// Whether CPU time could be used up by then: a thread uses no more than passes. [rt]
+    bool may_be_over_budget(time_ns_t now_ns) const MAUVE_RT {
+      return budget_ns != 0 && now_ns - began_ns > budget_ns;
+    }
+    /// By the thread's CPU clock. [rt]
+    time_ns_t cpu_left_ns(time_ns_t cpu_now_ns) const MAUVE_RT {
+      return cpu_end_ns == kForever ? budget_ns : cpu_end_ns - cpu_now_ns;
+    }
+    /// The last instant at which it is over neither of them, whatever it does. [rt]
+    time_ns_t end_ns() const MAUVE_RT { return ExecutionWord::end_ns(began_ns, limit_ns, budget_ns); }
   };
-  /// The last instant at which it is not over its bound. [rt]
-  static constexpr time_ns_t end_ns(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
+  /// The last instant at which it is not over its bound; with a budget, at which it can be over neither. [rt]
+  static constexpr time_ns_t end_ns(time_ns_t began_ns, time_ns_t limit_ns, time_ns_t budget_ns = 0)
+      MAUVE_RT {
+    if (budget_ns != 0) limit_ns = std::min(limit_ns, budget_ns);
     return limit_ns < kForever - began_ns ? began_ns + limit_ns : kForever;
   }
 
@@ -77,13 +95,19 @@ class ExecutionWord {
     return (word & kPhase) <= kRunning &&
            word_.compare_exchange_strong(word, word & ~(kPhase | kEntered), std::memory_order_acq_rel);
   }
-  /// False when the thread has timed out. [rt]
-  bool begin(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT {
+  /// False when the thread has timed out. `budget_ns`: of CPU time, which set_cpu_end() follows; 0: none. [rt]
+  bool begin(time_ns_t began_ns, time_ns_t limit_ns, time_ns_t budget_ns = 0) MAUVE_RT {
     began_ns_.store(began_ns, std::memory_order_release);
     limit_ns_.store(limit_ns, std::memory_order_release);
+    budget_ns_.store(budget_ns, std::memory_order_release);
+    cpu_end_ns_.store(kForever, std::memory_order_release);
     std::uint32_t before = word_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
     return (before & kPhase) == kIdle &&
            word_.compare_exchange_strong(before, (before + kNext) | kRunning, std::memory_order_seq_cst);
+  }
+  /// When the budget of what has begun is used up, by the thread's CPU clock. [rt]
+  void set_cpu_end(time_ns_t cpu_end_ns) MAUVE_RT {
+    cpu_end_ns_.store(cpu_end_ns, std::memory_order_release);
   }
   /// False when it timed out before it ended; true also when none was under way. [rt]
   bool end() MAUVE_RT {
@@ -124,13 +148,17 @@ class ExecutionWord {
   std::optional<Look> look() const MAUVE_RT {
     const std::uint32_t word = word_.load(std::memory_order_seq_cst);
     if ((word & kPhase) != kRunning) return std::nullopt;
-    return Look{word, began_ns_.load(std::memory_order_acquire), limit_ns_.load(std::memory_order_acquire)};
+    return Look{.word = word,
+                .began_ns = began_ns_.load(std::memory_order_acquire),
+                .limit_ns = limit_ns_.load(std::memory_order_acquire),
+                .budget_ns = budget_ns_.load(std::memory_order_acquire),
+                .cpu_end_ns = cpu_end_ns_.load(std::memory_order_acquire)};
   }
   /// The same, or whatever else the thread does in its fsm; its numbers say nothing then. [rt]
   std::optional<Look> look_at_any() const MAUVE_RT {
     const std::uint32_t word = word_.load(std::memory_order_acquire);
     if ((word & kPhase) != kRunning && (word & (kPhase | kEntered)) != kEntered) return std::nullopt;
-    return Look{word, 0, kForever};
+    return Look{.word = word, .began_ns = 0, .limit_ns = kForever, .budget_ns = 0, .cpu_end_ns = kForever};
   }
   /// False when it has ended, or another one was first. [rt]
   bool time_out(const Look& execution) MAUVE_RT {
@@ -181,6 +209,8 @@ class ExecutionWord {
   Atomic<std::uint32_t> word_{kIdle};
   Atomic<time_ns_t> began_ns_{0};
   Atomic<time_ns_t> limit_ns_{0};
+  Atomic<time_ns_t> budget_ns_{0};
+  Atomic<time_ns_t> cpu_end_ns_{kForever};
 };
 
 }  // namespace mauve

@@ -22,10 +22,11 @@
 
 namespace mauve {
 
-/// An execution that has ended took longer than it declared.
+/// An execution that has ended took longer than it declared, or more CPU time than its worst case.
 struct OverBound : std::exception {
-  explicit OverBound(time_ns_t bound) : bound_ns(bound) {}
+  explicit OverBound(time_ns_t bound, time_ns_t cpu = 0) : bound_ns(bound), cpu_ns(cpu) {}
   time_ns_t bound_ns;
+  time_ns_t cpu_ns;  // that it used, where the bound is a budget of CPU time
 };
 
 /// A wait of a new fsm that goes on for the wait of the same name of the fsm before.
@@ -150,8 +151,9 @@ class Machine {
 
   // ---- its part in a change that is made in its wait
 
-  /// What begins now is to last no longer than this; false when who runs it has timed out. [rt]
-  bool begin_execution(time_ns_t began_ns, time_ns_t limit_ns) MAUVE_RT;
+  /// What begins now is to last no longer than this, nor to use more CPU time than the budget (0: any); false when who runs it
+  /// has timed out. [rt]
+  bool begin_execution(time_ns_t began_ns, time_ns_t limit_ns, time_ns_t budget_ns = 0) MAUVE_RT;
   /// It has ended; false when it timed out before. [rt]
   bool end_execution() MAUVE_RT { return execution_.end(); }
   /// It is about to park, and nothing is under way any more; false when it timed out before. [rt]
@@ -229,6 +231,7 @@ class Machine {
   static constexpr time_ns_t kNever = INT64_MIN;
 
   bool execute(const State& state);
+  time_ns_t begin_budget(time_ns_t budget_ns) MAUVE_RT;
   const State* successor(const State& state) const;
   void enter_wait(const State& state);
   void handle_overrun(const State& state, time_ns_t now_ns);
@@ -248,7 +251,7 @@ class Machine {
   Atomic<time_ns_t> reference_ns_{0};
   Atomic<time_ns_t> deployment_ns_{0};  // the reference of the deployment's grid
   Atomic<time_ns_t> period_ns_{0};
-  Atomic<time_ns_t> wait_bound_ns_{0};  // of what follows a wait; 0: none, or it cannot be foreseen
+  Atomic<time_ns_t> wait_bound_ns_{0};  // or budget of what follows a wait; 0: none, or it cannot be foreseen
 
   Context context_;
   TaskStatistics statistics_;

@@ -37,10 +37,11 @@ struct OutputLimit {
 
 /// How long a new core is on probation, and which violations put the old core back.
 struct ProbationOptions {
-  time_ns_t duration_ns{0};      // 1 to kLongest, by the host's clock, also while the component is stopped
-  bool on_fault{true};           // an exception, a failed take, an execution over its bound
-  bool on_overrun{false};        // a wait entered after its end
-  bool on_over_declared{false};  // an execution over its bound (max_execution), without the other faults
+  time_ns_t duration_ns{0};  // 1 to kLongest, by the host's clock, also while the component is stopped
+  bool on_fault{true};       // an exception, a failed take, an execution over its bound
+  bool on_overrun{false};    // a wait entered after its end
+  bool on_over_declared{
+      false};  // an execution over its bound (max_execution, wcet), without the other faults
   std::vector<OutputLimit> outputs{};
   std::int64_t min_releases{1};  // at least 1; with fewer the verdict is inconclusive
 };
@@ -257,6 +258,7 @@ class Probation : public std::enable_shared_from_this<Probation> {
   Found found_{};
   std::shared_ptr<const std::string> fault_;
   time_ns_t fault_bound_ns_{0};
+  time_ns_t fault_cpu_ns_{0};
   std::uint32_t fault_where_{0};
   Atomic<std::int64_t> releases_{0};
   Atomic<bool> is_requested_{false};

@@ -46,9 +46,13 @@ struct Fault {
 struct FaultNote {
   std::shared_ptr<const std::string> what{};  // nullptr: an execution over its bound
   time_ns_t bound_ns{0};
+  time_ns_t cpu_ns{0};     // that the execution used, where the bound is its budget of CPU time
   bool is_visit{false};    // the bound was that of an adopt or a take
   std::uint32_t where{0};  // the state's name in the trace
   time_ns_t when_ns{0};
+
+  /// Of an execution that used more CPU time than its worst case. [non-rt]
+  std::string over_budget() const;
 };
 
 /// Shared by all tasks of a deployment: bumped on every change of a component's state.
@@ -293,11 +297,11 @@ class Task final : public Waiter {
   /// FAULTED, takes the thread's priority away, then writes what outputs can be written without waiting. False when none is
   /// under way. [non-rt], it allocates.
   bool time_out(std::string what, time_ns_t now_ns);
-  /// The same where it is over its bound. [rt]
+  /// The same where it is over its bound, or over its budget of CPU time. [rt]
   bool time_out_if_over(time_ns_t now_ns) MAUVE_RT;
-  /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound; kForever: the
+  /// The earliest instant at which a bounded execution, under way or foreseen, can be over its bound or budget; kForever: the
   /// thread wakes the watchdog itself. [rt]
-  time_ns_t earliest_excess_ns() const MAUVE_RT { return machine_.earliest_excess_ns(); }
+  time_ns_t earliest_excess_ns(time_ns_t now_ns) const MAUVE_RT;
   /// Outputs that had to be left because of a lock: takes the right to write them; writes those that can be, all of them
   /// or not. [rt] as far as the resources are. By the watchdog's writer.
   bool take_outputs_left() noexcept;
@@ -419,7 +423,7 @@ class Task final : public Waiter {
   void leave_slot(std::uint32_t to) MAUVE_RT;
   void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
   void park_stopped() noexcept;
-  void park_faulted(const char* what, time_ns_t bound_ns = 0) noexcept;
+  void park_faulted(const char* what, time_ns_t bound_ns = 0, time_ns_t cpu_ns = 0) noexcept;
   void park_timed_out(bool has_taken_change = false) noexcept;
   void end_in_fault(bool has_taken_change = false) noexcept;
   void park(ComponentState state) noexcept;

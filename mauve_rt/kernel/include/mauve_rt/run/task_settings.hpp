@@ -37,12 +37,13 @@ struct TaskSettings {
   std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
   time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
   time_ns_t deadline_ns{0};      // from a release to the next wait, for the analysis; 0: the next instant
+  bool enforce_wcet{false};      // wcet_ns of an execution state is a budget of CPU time; a fault above it
   std::vector<DeclaredState> states{};  // of the fsm's execution states
   bool operator==(const TaskSettings&) const = default;
 };
 
-/// The value of a setting as files and Python have it: a number, numbers or a word.
-using SettingValue = std::variant<std::int64_t, std::vector<int>, std::string>;
+/// The value of a setting as files and Python have it: a number, numbers, a word, or yes or no.
+using SettingValue = std::variant<std::int64_t, std::vector<int>, std::string, bool>;
 
 /// One of them, for all who look at a setting without knowing which it is.
 struct TaskSetting {
@@ -107,6 +108,11 @@ inline constexpr std::array kTaskSettings{
                                                  "leave the key out for 10 periods, 1 s at least"),
     number_setting<&TaskSettings::deadline_ns>("deadline_ns", 1, kLongest,
                                                "leave the key out for the next instant"),
+    TaskSetting{.name = "enforce_wcet",
+                .hint = "without it nothing enforces wcet_ns",
+                .get = [](const TaskSettings& all) -> SettingValue { return all.enforce_wcet; },
+                .assign = [](TaskSettings& all,
+                             const SettingValue& value) { all.enforce_wcet = std::get<bool>(value); }},
 };
 
 /// Throws Error (out_of_range, invalid_argument) unless the value is one that the setting takes; `component` is

@@ -102,6 +102,8 @@ void wake_all(const void* address) noexcept;
 void wake_one(const void* address) noexcept;
 time_ns_t now_ns() noexcept;
 time_ns_t cpu_ns() noexcept;
+/// Of any thread.
+time_ns_t cpu_ns(const Thread& thread) noexcept;
 /// Of the calling thread: it could run, and others ran.
 time_ns_t kept_ns() noexcept;
 

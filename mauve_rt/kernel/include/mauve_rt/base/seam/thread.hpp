@@ -3,8 +3,10 @@
 #pragma once
 
 #include <pthread.h>
+#include <time.h>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/clocks.hpp"
 #include "mauve_rt/base/seam/thread_settings.hpp"
 
 namespace mauve {
@@ -23,9 +25,12 @@ class Thread {
   void prefault_stack() const noexcept;
   /// [rt]
   pthread_t handle() const MAUVE_RT { return handle_; }
+  /// The CPU time that it has used, as thread_cpu_now_ns() says on the thread itself; 0: it has ended. [rt]
+  time_ns_t cpu_now_ns() const MAUVE_RT;
 
  private:
   pthread_t handle_{};
+  clockid_t cpu_clock_{};  // from the start: a handle of a thread that was joined may not be asked
 };
 
 }  // namespace mauve

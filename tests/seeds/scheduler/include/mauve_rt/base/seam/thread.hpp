@@ -21,6 +21,7 @@ class Thread {
   ThreadFacts facts() const;
   void prefault_stack() const noexcept {}
   pthread_t handle() const MAUVE_RT { return seeds::handle(*thread_); }
+  time_ns_t cpu_now_ns() const MAUVE_RT { return seeds::cpu_ns(*thread_); }
 
  private:
   seeds::Thread* thread_{nullptr};
