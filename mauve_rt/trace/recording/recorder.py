@@ -1,5 +1,6 @@
 """Records an executor's trace, and whatever messages it is given, into a bag while the executor runs."""
 
+import contextlib
 import threading
 import time
 from collections import Counter
@@ -8,6 +9,7 @@ from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
 from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.recording.tap import Tap
 from mauve_rt.trace.recording.trace_bag import (
     BATCHES,
     DROPPED_MESSAGES,
@@ -38,6 +40,9 @@ class Recorder:
     The rings are emptied often by a native thread of the source, so neither a disk that makes this one wait
     nor a busy interpreter costs records, as long as there is room to collect them. A failure to write (a full
     disk) ends the recording, is told once through `on_error`, and leaves the bag as the flush before left it.
+
+    stop() takes the last records and releases the sources itself, before it waits for the disk: a later
+    recording of the same sources is whole, however long the disk of this one hangs.
 
     Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain.
 
@@ -84,13 +89,11 @@ class Recorder:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
 
         """
-        self._source = source
         self._flush_period_s = flush_period_s
         self._drain_period_s = min(drain_period_s, flush_period_s)
         self._queue_bytes = queue_bytes
         self._on_error = on_error
-        self._messages = messages
-        self._dropped_before = messages.dropped_messages() if messages is not None else 0
+        self._tap = Tap(source, messages)
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
             source, directory, node_name=node_name, on_error=self._report, split=split, disk=disk
@@ -115,7 +118,12 @@ class Recorder:
     def recording(self) -> bool:
         """False before start(), after stop(), and after a failure."""
         with self._lock:
-            return self._recording
+            return self._recording and not self._stop.is_set()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it has ended, and waits for the disk no longer."""
+        return self._stop.is_set() and not self._thread.is_alive()
 
     @property
     def error(self) -> str:
@@ -131,9 +139,9 @@ class Recorder:
     @property
     def dropped_messages(self) -> int:
         """Messages that were to be recorded and did not get into the bag."""
-        elsewhere = self._messages.dropped_messages() if self._messages is not None else 0
+        elsewhere = self._tap.dropped_messages()
         with self._lock:
-            return self._lost.total() + elsewhere - self._dropped_before
+            return self._lost.total() + elsewhere
 
     def start(self, *, discard: bool = False) -> None:
         """Start the thread. Once only.
@@ -142,11 +150,9 @@ class Recorder:
             discard: leave out what the rings hold already, from before.
 
         """
-        self._source.collect_trace(round(self._drain_period_s * 1e9))
-        if discard:
-            self._bag.discard(self._source.drain_trace())
-        if self._messages is not None:
-            self._messages.keep_messages(on=True)
+        discarded = self._tap.open(round(self._drain_period_s * 1e9), discard=discard)
+        if discarded is not None:
+            self._bag.discard(discarded)
         with self._lock:
             self._recording = True
         self._thread.start()
@@ -173,6 +179,8 @@ class Recorder:
 
         """
         with self._lock:
+            if self._stop.is_set():
+                return False
             self._received[topic] += 1
             if not self._recording or self._waiting_bytes + len(data) > self._queue_bytes:
                 self._lost[topic] += 1
@@ -187,13 +195,24 @@ class Recorder:
             self._received[topic] += count
             self._lost[topic] += count
 
-    def stop(self) -> None:
-        """Drain and flush a last time, close the bag. Returns within 2 s; may be called again."""
-        self._stop.set()
+    def stop(self) -> bool:
+        """Take the last records, flush, close the bag. May be called again.
+
+        Returns:
+            False when the disk did not answer within 2 s: the bag is not complete. The recorder thread goes on
+            to wait for the disk, and completes the bag.
+
+        """
+        with self._lock:
+            self._stop.set()
+        with contextlib.suppress(Exception):  # the recorder thread meets and reports it
+            self._tap.close()
         if self._thread.ident is None:
             self._bag.abort()
-        elif self._thread is not threading.current_thread():
+            return True
+        if self._thread is not threading.current_thread():
             self._thread.join(_JOIN_TIMEOUT_S)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
         try:
@@ -202,10 +221,11 @@ class Recorder:
                 self._write()
                 self._bag.flush()
                 next_s = max(next_s + self._flush_period_s, time.monotonic())
-            with self._lock:
-                self._recording = False
+            self._tap.close()
             self._write()
             self._bag.close()
+            with self._lock:
+                self._recording = False
         except BaseException as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
             with self._lock:
                 self._recording = False
@@ -213,22 +233,20 @@ class Recorder:
             self._bag.abort()
             self._report(self._error)
         finally:
-            self._source.collect_trace(0)
-            if self._messages is not None:
-                self._messages.keep_messages(on=False)
+            with contextlib.suppress(Exception):  # the recording has ended, and why is reported
+                self._tap.close()
 
     def _write(self) -> None:
-        with self._lock:  # before the drain: then no message is later than the clock pair that maps it
+        with self._lock:  # before the tap: then no message is later than the clock pair that maps it
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
             architecture = self._architecture
             received, lost = (
                 self._received.copy(),
                 self._lost.copy(),
             )  # with what waits: the bag tells of no more
-        taken = self._messages.take_messages() if self._messages is not None else ()
+        drain, taken = self._tap.take()
         more = Counter(message.topic for message in taken)
         waiting += taken
-        drain = self._source.drain_trace()
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)

@@ -14,7 +14,11 @@ from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag.disk import Disk, KeptDisk
+from mauve_rt.trace.bag.recorded import SentMessage
 from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.check import check_bag
+from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -168,14 +172,78 @@ def test_a_disk_that_stands_still_holds_up_no_recorder(tmp_path: Path):
     try:
         until(lambda: not record(recorder), "the queue to be full")
         assert recorder.dropped_messages > 0
-        recorder.stop()
-        assert recorder.recording, "it waits for the disk still"
+        assert not recorder.stop()
+        assert not recorder.is_closed, "it waits for the disk still"
     finally:
         os.kill(process, signal.SIGCONT)
-    until(lambda: not recorder.recording, "its end")
+    until(lambda: recorder.is_closed, "its end")
     until(lambda: has_ended(process), "the keeper's end")
     with Reader(tmp_path / "bag") as reader:
         assert reader.message_count == recorder.message_count
+
+
+class TappedSource(SyntheticSource):
+    """A source that counts who empties its rings, and a source of messages that serves one at a time."""
+
+    period_ns = 0
+    is_on = False
+    number = 0
+
+    def collect_trace(self, period_ns: int) -> None:
+        self.period_ns = period_ns
+
+    def keep_messages(self, *, on: bool) -> None:
+        self.is_on = on
+
+    def take_messages(self) -> list[SentMessage]:
+        if not self.is_on:
+            return []
+        self.number += 1
+        text = f"{self.number}".encode()
+        data = bytes([0, 1, 0, 0, len(text) + 1, 0, 0, 0]) + text + bytes(1)
+        return [SentMessage("/numbers", TEXT, data, self.number, None)]
+
+    def dropped_messages(self) -> int:
+        return 0
+
+
+def test_a_hanging_disk_harms_no_later_recording(tmp_path: Path):
+    source = TappedSource(["c"])
+
+    def begun(name: str) -> Recorder:
+        made = Recorder(source, tmp_path / name, node_name="/executor", keeper=KEEPER, messages=source)
+        made.start()
+        return made
+
+    slow = begun("slow")
+    keeper = slow._bag._bag._disk._process
+    until(lambda: slow.message_count > 0, "a flush")
+    os.kill(keeper, signal.SIGSTOP)
+    try:
+        source.add("c", Kind.MARK, 1)
+        assert not slow.stop()
+        assert (source.period_ns, source.is_on) == (0, False), "the tap is released, the disk hangs yet"
+        last = source.number
+        next_one = begun("next")
+        source.add("c", Kind.MARK, 2)
+    finally:
+        os.kill(keeper, signal.SIGCONT)
+    until(lambda: slow.is_closed, "the end of the slow one")
+    assert source.period_ns > 0
+    assert source.is_on
+    source.add("c", Kind.MARK, 3)
+    taken = source.number
+    until(lambda: source.number > taken, "messages for the next one")
+    assert next_one.stop()
+    times = {}
+    for name in ("slow", "next"):
+        assert check_bag(tmp_path / name)[-1].kind == "note", "no architecture"
+        trace = open_trace(tmp_path / name)
+        times[name] = [int(row["time_ns"]) for row in trace.of("c")]
+        numbers = [int(message.msg.data) for message in trace.messages("/numbers")]
+        expected = range(1, last + 1) if name == "slow" else range(last + 1, source.number + 1)
+        assert numbers == list(expected)
+    assert times == {"slow": [1], "next": [2, 3]}
 
 
 def record(recorder: Recorder) -> bool:
