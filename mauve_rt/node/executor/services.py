@@ -64,10 +64,9 @@ from mauve_rt.node.shared.watch import Watch
 class Services:
     """The services of a node.
 
-    Requests for changes wait for each other (`is_change`). Requests to stop or start a component, or to start or
-    stop a recording, wait for no other request. They are
-    in `control_group`, lists in `query_group`. `~/list_changes` and `~/abandon_change` wait for nobody,
-    either. Who asked is answered first; then another thread tells of it
+    Requests for changes wait for each other (`is_change`). Requests to stop or start a component or a
+    recording wait for no other request. They are in `control_group`, lists in `query_group`. `~/list_changes` and `~/abandon_change` wait for no other
+    request, either. Who asked is answered first; then another thread tells of it
     on ~/state and ~/events.
 
     | member    | written by                | guarded by                      |

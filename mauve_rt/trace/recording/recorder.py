@@ -199,8 +199,8 @@ class Recorder:
         """Take the last records, flush, close the bag. May be called again.
 
         Returns:
-            False when the disk did not answer within 2 s: the bag is not complete. The recorder thread goes on
-            to wait for the disk, and completes the bag.
+            False when the disk did not answer within 2 s: the bag is not complete. The recorder thread
+            waits on, and completes the bag.
 
         """
         with self._lock:

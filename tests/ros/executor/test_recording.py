@@ -284,11 +284,8 @@ def test_no_request_waits_for_a_disk_on_which_a_bag_is_made(
         is_called_off = bag == "hanging_2"
         answer = client.call_async(StartRecording.Request(bag=bag))
         graph.spin_until(hangs.exists, "the disk to hang")
-        swap = {
-            "component": "counter",
-            "core": f"executor_tests/{'Counter' if is_called_off else 'Backwards'}",
-        }
-        reply = graph.ask(ReplaceCore, f"{EXECUTOR}/replace_core", **swap)
+        core = "executor_tests/Counter" if is_called_off else "executor_tests/Backwards"
+        reply = graph.ask(ReplaceCore, f"{EXECUTOR}/replace_core", component="counter", core=core)
         assert reply.success, reply.message
         again = start(graph, bag="other")
         assert (again.success, again.code) == (False, ReplyCode.ALREADY_RUNNING)
