@@ -65,9 +65,9 @@ class Services:
     """The services of a node.
 
     Requests for changes wait for each other (`is_change`). Requests to stop or start a component or a
-    recording wait for no other request. They are in `control_group`, lists in `query_group`. `~/list_changes` and `~/abandon_change` wait for no other
-    request, either. Who asked is answered first; then another thread tells of it
-    on ~/state and ~/events.
+    recording wait for no other request, and so with `~/list_changes` and `~/abandon_change`. They are in
+    `control_group`, lists in `query_group`. Who asked is answered first; then another thread tells of it on
+    ~/state and ~/events.
 
     | member    | written by                | guarded by                      |
     | --------- | ------------------------- | ------------------------------- |

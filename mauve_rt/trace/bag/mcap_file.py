@@ -10,7 +10,8 @@ On disk, always:
 A flush turns the waiting messages into one chunk and writes it, followed by the new tail, over the old
 tail, in one write. The file is complete before and after it; a process killed between two flushes leaves
 all that was flushed. Inside of the write it takes a `KeptDisk`: Linux gives up a write between two pages
-when its process is killed. (Power loss is another matter: nothing here waits for the disk.)
+when its process is killed. A power loss costs what was written since the last fdatasync (`disk.py`), and the
+tail: a repair writes a new one.
 
 The summary is kept as bytes that only grow, so a flush costs the new messages plus the chunk indexes, never
 the file. Format: https://mcap.dev/spec.
@@ -21,12 +22,12 @@ import functools
 import os
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from mauve_rt.counts import counted
-from mauve_rt.trace.bag.disk import Disk
+from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, MetadataError
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
 from mauve_rt.trace.format.mcap_records import Opcode, record
@@ -117,8 +118,10 @@ class McapFile:
         """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
         self._chunk.add(channel_id, log_time_ns, data, publish_time_ns=publish_time_ns)
 
-    def flush(self) -> None:
-        """Write what waits; the file is complete before and after.
+    def flush(self, *, metadata: Callable[[], Metadata] | None = None, sync: bool = False) -> None:
+        """Write what waits, then the metadata.yaml that tells of it; the file is complete before and after.
+
+        `sync`: all of it is on the disk afterwards.
 
         Schemas and channels wait for a message: a chunk without one has no message index, and where the first
         chunk has none, libmcap (rosbag2's reader) gives up the whole file.
@@ -128,13 +131,17 @@ class McapFile:
             and complete. Or the file is no longer in its place: all of it is lost.
 
         """
-        self._write_what_waits()
+        chunk, before = self._written, self._before = self._chunk, self._now
+        parts = self._build(chunk, before) if self.is_waiting else ()
+        if parts or metadata is not None or sync:
+            text = None if metadata is None else metadata()
+            self._write(parts, before.data_end, text, sync=sync)
+        if parts:
+            self._chunk = PendingChunk()
         self._check_place()
 
-    def _write_what_waits(self) -> None:
-        chunk, before = self._written, self._before = self._chunk, self._now
-        if not self.is_waiting:
-            return
+    def _build(self, chunk: PendingChunk, before: "_Finished") -> Sequence[bytes | bytearray]:
+        """Let `_now` be the file with that chunk; returns what is to be written behind its data."""
         parts, index = chunk.build(before.data_end)
         self._chunk_indexes += index
         self._now = self._finished(
@@ -143,12 +150,19 @@ class McapFile:
             before.data_end + sum(map(len, parts)),
             functools.reduce(lambda crc, part: zlib.crc32(part, crc), parts, before.data_crc),
         )
+        return (*parts, self._now.tail)
+
+    def _write(
+        self, parts: Sequence[bytes | bytearray], offset: int, metadata: Metadata | None, *, sync: bool
+    ) -> None:
         try:
-            self._disk.write(self._descriptor, (*parts, self._now.tail), before.data_end)
+            self._disk.write(self._descriptor, parts, offset, metadata=metadata, sync=sync)
+        except MetadataError as error:
+            what = f"bag {self.path.parent}: {METADATA} cannot be written ({error.strerror})"
+            raise TraceError(f"{what}; {self.undo_flush()}") from error
         except OSError as error:
             msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
             raise TraceError(msg) from error
-        self._chunk = PendingChunk()
 
     def _check_place(self) -> None:
         """The system lets a file be written that has no name any longer."""

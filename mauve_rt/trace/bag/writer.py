@@ -1,23 +1,18 @@
 """A rosbag2 directory around MCAP files: metadata.yaml, message definitions, topics."""
 
+import os
 import shutil
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import mauve_rt
-from mauve_rt.trace.bag.disk import Disk
+from mauve_rt.trace.bag.disk import Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
-from mauve_rt.trace.bag.metadata import (
-    CUSTOM_DATA,
-    METADATA,
-    BagFileCounts,
-    BagTopic,
-    named_files,
-    write_metadata,
-)
+from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
 from mauve_rt.trace.bag.recorded import TopicQos
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
@@ -35,9 +30,9 @@ class _Topic:
 class BagWriter:
     """A bag that is a finished one at every flush, in one file or, by split(), in several.
 
-    The MCAP file is written first, metadata.yaml replaced afterwards: one that is older than the files (a
-    kill between the two) promises less than they hold, and readers open both. Where it cannot be replaced (a
-    full disk), the file goes back to what it tells. For one thread at a time.
+    The MCAP file is written first, metadata.yaml replaced afterwards, both in one order to the disk: with a
+    keeper, a kill leaves none of both newer than the other. Where metadata.yaml cannot be replaced (a full
+    disk), the file goes back to what it tells. For one thread at a time.
 
     Chunks are in order of log time: a message that waited elsewhere while an earlier flush took later ones
     gets the log time of that flush. Its publish time stays its own.
@@ -59,6 +54,7 @@ class BagWriter:
         self._complete: list[BagFileCounts] = []  # files that were split off
         self._stale = True  # metadata.yaml does not tell what the files hold
         self._told: set[str] = set()  # the files that metadata.yaml names
+        self._opened = ExitStack()
         self._flushed_ns = 0  # latest log time of all that was flushed
         try:
             self._create()
@@ -80,18 +76,21 @@ class BagWriter:
             msg = f"bag folder {self.directory}: exists already; remove it or choose another name"
             raise TraceError(msg)
         try:
+            self._folder = os.open(unfinished, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+            self._opened.callback(os.close, self._folder)
             self._file = self._new_file(unfinished)
-            self._write_metadata(unfinished)
+            self._opened.callback(lambda: self._file.abort())  # noqa: PLW0108 - the present one
+            self._flush(sync=True)
             unfinished.rename(self.directory)
-        except TraceError:
+        except (TraceError, OSError) as error:
+            self._opened.close()
             shutil.rmtree(unfinished, ignore_errors=True)
-            raise
-        except OSError as error:
-            self._file.abort()
-            shutil.rmtree(unfinished, ignore_errors=True)
+            if isinstance(error, TraceError):
+                raise
             msg = f"bag folder {self.directory}: cannot be created ({error.strerror})"
             raise TraceError(msg) from error
         self._file.path = self.directory / self._file.path.name
+        sync_folder(self.directory.parent)
 
     @property
     def message_count(self) -> int:
@@ -166,7 +165,7 @@ class BagWriter:
             TraceError: as flush; or the new file cannot be created.
 
         """
-        self.flush()
+        self._flush(sync=True)
         self._complete.append(BagFileCounts(self._file.path.name, self._file.flushed))
         self._file.close()
         self._file = self._new_file(self.directory)
@@ -183,36 +182,34 @@ class BagWriter:
             TraceError: the system refused; the bag stays as the flush before left it. Call abort() then.
 
         """
+        self._flush(sync=False)
+
+    def _flush(self, *, sync: bool) -> None:
         if self._file.is_waiting:
             self._stale = True
         if self._custom_data:
             self._file.set_metadata(CUSTOM_DATA, self._custom_data)
-        self._file.flush()
+        self._file.flush(metadata=self._metadata if self._stale else None, sync=sync)
         if self._stale:
-            try:
-                self._write_metadata(self.directory)
-            except OSError as error:
-                kept = self._file.undo_flush()
-                msg = f"bag {self.directory}: {METADATA} cannot be written ({error.strerror}); {kept}"
-                raise TraceError(msg) from error
-            self._stale = False
+            self._told = {file.name for file in self._files()}
+        self._stale = False
         self._flushed_ns = max(self._flushed_ns, self._file.flushed.end_ns)
 
     def close(self) -> None:
-        """Flush and close.
+        """Flush, have all of it on the disk, and close.
 
         Raises:
             TraceError: as flush; the bag is closed all the same.
 
         """
         try:
-            self.flush()
+            self._flush(sync=True)
         finally:
             self.abort()
 
     def abort(self) -> None:
         """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
-        self._file.abort()
+        self._opened.close()
         if self._complete and self._file.path.name not in self._told:  # new and empty
             self._file.path.unlink(missing_ok=True)
         self._disk.close()
@@ -241,12 +238,11 @@ class BagWriter:
         library = f"mauve_rt {mauve_rt.__version__}"
         return McapFile(path, profile="ros2", library=library, disk=self._disk)
 
-    def _write_metadata(self, directory: Path) -> None:
-        topics = [_counted(topic, self._files()) for topic in self._topics.values()]
-        write_metadata(
-            directory, self._files(), topics, custom_data=self._custom_data, ros_distro=self._ros_distro
-        )
-        self._told = {file.name for file in self._files()}
+    def _metadata(self) -> Metadata:
+        files = self._files()
+        topics = [_counted(topic, files) for topic in self._topics.values()]
+        text = metadata_text(files, topics, custom_data=self._custom_data, ros_distro=self._ros_distro)
+        return Metadata(self._folder, text)
 
 
 def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:

@@ -4,17 +4,21 @@ import errno
 import os
 import shutil
 import signal
+import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bag_kills import KEEPER, TEXT, has_ended, kill_in_a_write, until
 from bag_rules import assert_rosbag2_reads
 from mcap.reader import make_reader
+from preloaded import DiskCalls
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag.disk import Disk, KeptDisk
 from mauve_rt.trace.bag.recorded import SentMessage
+from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.reading.check import check_bag
@@ -157,7 +161,7 @@ def test_where_it_cannot_be_started_the_process_writes_itself_and_says_so(tmp_pa
 
 def test_it_takes_nothing_of_its_process(kept: Kept, file: int):
     """No pipe of it stays open, and no folder in use."""
-    kept.disk.write(file, (b"it has begun",), 0)
+    kept.disk.write(file, (b"it has begun",), 0, sync=True)
     held = {path.readlink() for path in Path(f"/proc/{kept.process}/fd").iterdir()}
     assert {str(path).partition(":")[0] for path in held} == {"/dev/null", "socket", "/memfd"}
     assert Path(f"/proc/{kept.process}/cwd").readlink() == Path("/")
@@ -180,6 +184,83 @@ def test_a_disk_that_stands_still_holds_up_no_recorder(tmp_path: Path):
     until(lambda: has_ended(process), "the keeper's end")
     with Reader(tmp_path / "bag") as reader:
         assert reader.message_count == recorder.message_count
+
+
+# ---- a power loss: what is on the disk, not only in memory
+
+
+@pytest.fixture
+def calls(tmp_path: Path) -> DiskCalls:
+    return DiskCalls(KEEPER, tmp_path)
+
+
+def recorded(tmp_path: Path, calls: DiskCalls, **options: Any) -> Recorder:
+    source = SyntheticSource(["c"])
+    return Recorder(source, tmp_path / "bag", node_name="/executor", keeper=calls.keeper, **options)
+
+
+def test_what_is_written_is_on_the_disk_each_second(tmp_path: Path, calls: DiskCalls):
+    recorder = recorded(tmp_path, calls, flush_period_s=0.05)
+    created = [*calls.seen()]
+    assert "fdatasync bag_0.mcap" in created or "fdatasync .bag_0.mcap.new" in created
+    recorder.start()
+    synced = time.monotonic()
+    for count in range(1, 4):
+        until(lambda: calls.seen()[len(created) :].count("fdatasync bag_0.mcap") >= count, "a sync")  # noqa: B023
+    assert time.monotonic() - synced > 2, "not at each flush"
+    seen = calls.seen()[len(created) :]
+    first = seen.index("fdatasync bag_0.mcap")
+    assert seen[first - 1] == "pwrite bag_0.mcap"
+    assert seen[first + 1 : first + 5] == [
+        "pwrite .metadata.yaml.new",
+        "fdatasync .metadata.yaml.new",
+        "renameat bag",
+        "fsync bag",
+    ], "the file is on the disk before the metadata.yaml that tells of it"
+    flushes = seen.count("renameat bag")
+    assert flushes > seen.count("fsync bag")
+    recorder.stop()
+
+
+def test_what_is_written_last_is_on_the_disk_a_second_later(tmp_path: Path, calls: DiskCalls):
+    file = os.open(tmp_path / "file", os.O_RDWR | os.O_CREAT)
+    kept = Kept(calls.keeper)
+    kept.disk.write(file, (b"data",), 0)
+    assert calls.seen() == ["pwrite file"]
+    until(lambda: calls.seen() == ["pwrite file", "fdatasync file"], "a sync without another write")
+    kept.disk.write(file, (b"data",), 0)
+    kept.disk.close()
+    until(lambda: calls.seen()[2:] == ["pwrite file", "fdatasync file"], "a sync at the end")
+    os.close(file)
+
+
+def test_a_split_and_an_end_are_on_the_disk(tmp_path: Path, calls: DiskCalls):
+    bag = BagWriter(tmp_path / "bag", disk=Kept(calls.keeper).disk)
+    bag.add_topic("/words", TEXT)
+    for name, end in (("bag_0.mcap", bag.split), ("bag_1.mcap", bag.close)):
+        bag.write("/words", 1, bytes([0, 1, 0, 0, 2, 0, 0, 0, 48, 0]))
+        before = len(calls.seen())
+        end()
+        seen = calls.seen()[before:]
+        assert seen[: seen.index("fsync bag") + 1] == [
+            f"pwrite {name}",
+            f"fdatasync {name}",
+            "pwrite .metadata.yaml.new",
+            "fdatasync .metadata.yaml.new",
+            "renameat bag",
+            "fsync bag",
+        ]
+
+
+def test_a_disk_that_cannot_sync_ends_the_recording(tmp_path: Path, calls: DiskCalls):
+    errors: list[str] = []
+    recorder = recorded(tmp_path, calls, on_error=errors.append)
+    recorder.start()
+    until(lambda: recorder.message_count > 0, "a flush")
+    calls.fail("fdatasync", errno.EIO)
+    until(lambda: not recorder.recording, "its end")
+    assert recorder.stop()
+    assert "Input/output error" in errors[0]
 
 
 class TappedSource(SyntheticSource):
@@ -266,6 +347,7 @@ def test_a_kill_in_a_write_leaves_whole_files(tmp_path: Path, size: int, split_e
                 by_mcap = sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
             with Reader(file) as reader:
                 assert sum(1 for _ in reader.messages()) == by_mcap
+        assert examine_bag(bag).damages() == [], "metadata.yaml is neither newer nor older"
         assert_rosbag2_reads(bag, was_killed=True)
         with Reader(bag) as reader:
             assert sum(1 for _ in reader.messages()) > trial, "what was flushed before is there"
