@@ -189,20 +189,30 @@ class Writer {
       return {.error = error, .is_metadata = 0};
     if (!unsynced_.is_open()) synced_at_ = Clock::now();
     unsynced_ = std::move(files.file);
+    folder_ = std::move(files.folder);
     if (due_ms() == 0) order.flags |= kSync;
     const bool is_synced = (order.flags & kSync) != 0;
     if (const std::int32_t error = is_synced ? sync() : 0; error != 0) return {.error = error, .is_metadata = 0};
     if (order.metadata_length != 0) {
-      if (const std::int32_t error = write_metadata(order, files.folder.get(), data + order.length); error != 0)
+      if (const std::int32_t error = write_metadata(order, folder_.get(), data + order.length); error != 0)
         return {.error = error, .is_metadata = 1};
     }
-    if (is_synced && files.folder.is_open() && fsync(files.folder.get()) != 0)
-      return {.error = errno, .is_metadata = 1};
+    if (is_synced && folder_.is_open()) {
+      const File folder = std::exchange(folder_, File());
+      if (fsync(folder.get()) != 0) return {.error = errno, .is_metadata = 1};
+    }
     return {.error = std::exchange(error_, 0), .is_metadata = 0};
   }
 
-  /// As soon as due; its error is that of the next order.
-  void sync_late() { error_ = sync(); }
+  /// Without an order, as soon as due; an error is that of the next order.
+  void sync_late() {
+    error_ = sync();
+    const File folder = std::exchange(folder_, File());
+    if (error_ != 0 || !folder.is_open()) return;
+    const File metadata(openat(folder.get(), kMetadata, O_RDONLY | O_CLOEXEC));
+    if (metadata.is_open() && fdatasync(metadata.get()) != 0) error_ = errno;
+    if (fsync(folder.get()) != 0) error_ = errno;
+  }
 
  private:
   std::int32_t sync() {
@@ -211,6 +221,7 @@ class Writer {
   }
 
   File unsynced_;  // the file that was written to since synced_at_
+  File folder_;    // where its metadata.yaml is
   Clock::time_point synced_at_;
   std::int32_t error_{0};
 };
