@@ -70,7 +70,7 @@ class RecordingStatus:
     """In the bag, the trace's own among them."""
     dropped: int
     error: str
-    """Why it ended by itself; empty when it did not."""
+    """Why it ended by itself, or is paused; empty when it did not."""
     is_complete: bool
     """The recording has ended, and the bag is closed."""
 
@@ -96,13 +96,23 @@ class Recording:
     """
 
     def __init__(
-        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, *, data_group: CallbackGroup
+        self,
+        node: LifecycleNode,
+        runtime: Runtime,
+        bound: BoundResources,
+        *,
+        data_group: CallbackGroup,
+        waits_for_room: bool = False,
     ) -> None:
-        """Take the node whose trace it is; chosen topics are received in `data_group`."""
+        """Take the node whose trace it is; chosen topics are received in `data_group`.
+
+        `waits_for_room`: a disk that refuses to write pauses a recording; else it ends it.
+        """
         self._node = node
         self._runtime = runtime
         self._bound = bound
         self._data_group = data_group
+        self._waits_for_room = waits_for_room
         self._lock = threading.RLock()
         self._recorder: Recorder | None = None
         self._shadows: RecordedShadows | None = None
@@ -150,6 +160,7 @@ class Recording:
                 on_error=self._node.get_logger().error,
                 messages=_Sources(self._bound, RecordedValues(self._runtime, recorded), shadows),
                 keeper=native_program("bag_keeper"),
+                waits_for_room=self._waits_for_room,
             )
             try:
                 self._record_into(recorder, shadows, chosen)

@@ -44,8 +44,14 @@ def metadata_text(
     *,
     custom_data: Mapping[str, str],
     ros_distro: str,
+    room_bytes: int = 0,
+    size: int = 0,
 ) -> bytes:
-    """Write it by hand: at every flush a YAML library would be most of the cost."""
+    """Write it by hand: at every flush a YAML library would be most of the cost.
+
+    `room_bytes`: blanks behind it, so that more can be written over it on a full disk; `size`: or as many as
+    it takes to be of that size.
+    """
     total = Counts()
     for file in files:
         total = total.plus(file.counts)
@@ -76,7 +82,9 @@ def metadata_text(
     for file in files:
         lines += [f"    - path: {_quoted(file.name)}", *(f"      {line}" for line in _span(file.counts))]
     lines += [f"  custom_data: {{{custom}}}", f"  ros_distro: {ros_distro}"]
-    return ("\n".join(lines) + "\n").encode()
+    text = ("\n".join(lines) + "\n").encode()
+    blanks = max(room_bytes, size - len(text))
+    return text + b" " * (blanks - 1) + b"\n" if blanks > 0 else text
 
 
 def _span(counts: Counts) -> list[str]:

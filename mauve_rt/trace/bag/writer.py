@@ -2,7 +2,7 @@
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,13 +10,17 @@ from types import TracebackType
 from typing import Self
 
 import mauve_rt
-from mauve_rt.trace.bag.disk import Disk, Metadata, sync_folder
+from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
 from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
 from mauve_rt.trace.bag.recorded import TopicQos
-from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
 from mauve_rt.unfinished import beside
+
+_FILE_ROOM_BYTES, _METADATA_ROOM_BYTES = 8192, 4096
+"""Kept in a file, and in metadata.yaml, for the reason of an interruption and the counts of a hundred topics
+that came just before it."""
 
 
 @dataclass(frozen=True)
@@ -38,8 +42,17 @@ class BagWriter:
     gets the log time of that flush. Its publish time stays its own.
     """
 
-    def __init__(self, directory: Path, *, ros_distro: str = "jazzy", disk: Disk | None = None) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        ros_distro: str = "jazzy",
+        disk: Disk | None = None,
+        keeps_room: bool = False,
+    ) -> None:
         """Create the folder (and its parents) with an empty, finished bag in it; closes `disk` with the bag.
+
+        `keeps_room`: until the end, for write_into_room().
 
         Raises:
             TraceError: the folder exists already, or cannot be written.
@@ -48,6 +61,7 @@ class BagWriter:
         self.directory = Path(directory)
         self._ros_distro = ros_distro
         self._disk = disk or Disk()
+        self._keeps_room = keeps_room
         self._custom_data: dict[str, str] = {}
         self._schemas: dict[str, tuple[int, Definition]] = {}
         self._topics: dict[str, _Topic] = {}
@@ -78,7 +92,7 @@ class BagWriter:
         try:
             self._folder = os.open(unfinished, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
             self._opened.callback(os.close, self._folder)
-            self._file = self._new_file(unfinished)
+            self._file = self._new_file(unfinished, 0)
             self._opened.callback(lambda: self._file.abort())  # noqa: PLW0108 - the present one
             self._flush(sync=True)
             unfinished.rename(self.directory)
@@ -166,9 +180,57 @@ class BagWriter:
 
         """
         self._flush(sync=True)
-        self._complete.append(BagFileCounts(self._file.path.name, self._file.flushed))
-        self._file.close()
-        self._file = self._new_file(self.directory)
+        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
+        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        self._declare()
+        before.close()
+
+    def drop_waiting(self) -> dict[str, int]:
+        """Give up what no flush could write; how many messages it was, by topic. Only go_on() helps then."""
+        by_channel = self._file.drop_waiting().by_channel
+        return {
+            name: by_channel[topic.channel_id]
+            for name, topic in self._topics.items()
+            if topic.channel_id in by_channel
+        }
+
+    def write_into_room(self) -> None:
+        """Write custom data into the room that was kept: a full disk takes it, too.
+
+        Raises:
+            DiskError: it does not fit, or the disk failed.
+
+        """
+        self._file.set_metadata(CUSTOM_DATA, self._custom_data)
+        size = os.stat(METADATA, dir_fd=self._folder).st_size
+        metadata = self._metadata(in_place=True, size=size)
+        if len(metadata.data) > size:
+            msg = f"bag {self.directory}: {METADATA} has no room left for last words"
+            raise DiskError(msg)
+        self._file.write_into_room(metadata)
+
+    def go_on(self, begin: Callable[[], None]) -> None:
+        """Go on in a new file, behind a flush that failed; `begin` writes what it begins with.
+
+        Raises:
+            DiskError: as flush; the bag is as before.
+
+        """
+        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
+        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        try:
+            self._declare()
+            begin()
+            self._flush(sync=True)
+        except TraceError:
+            self._file.abort()
+            self._file.path.unlink(missing_ok=True)
+            self._complete.pop()
+            self._file = before
+            raise
+        before.abort()
+
+    def _declare(self) -> None:
         for _, definition in self._schemas.values():  # in the same order: they get the same numbers
             _declare_schema(self._file, definition)
         for topic in self._topics.values():
@@ -184,12 +246,27 @@ class BagWriter:
         """
         self._flush(sync=False)
 
-    def _flush(self, *, sync: bool) -> None:
+    def finish(self) -> None:
+        """Flush for the last time: no room is kept any longer, and all of it is on the disk.
+
+        Raises:
+            TraceError: as flush.
+
+        """
+        self._stale = self._stale or self._keeps_room
+        self._keeps_room = False
+        self._flush(sync=True, is_last=True)
+
+    def _flush(self, *, sync: bool, is_last: bool = False) -> None:
         if self._file.is_waiting:
             self._stale = True
         if self._custom_data:
             self._file.set_metadata(CUSTOM_DATA, self._custom_data)
-        self._file.flush(metadata=self._metadata if self._stale else None, sync=sync)
+        metadata = self._metadata if self._stale else None
+        if is_last:
+            self._file.finish(metadata=metadata)
+        else:
+            self._file.flush(metadata=metadata, sync=sync)
         if self._stale:
             self._told = {file.name for file in self._files()}
         self._stale = False
@@ -203,7 +280,7 @@ class BagWriter:
 
         """
         try:
-            self._flush(sync=True)
+            self.finish()
         finally:
             self.abort()
 
@@ -233,16 +310,23 @@ class BagWriter:
     def _files(self) -> Sequence[BagFileCounts]:
         return named_files([*self._complete, BagFileCounts(self._file.path.name, self._file.flushed)])
 
-    def _new_file(self, directory: Path) -> McapFile:
-        path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
+    def _new_file(self, directory: Path, number: int) -> McapFile:
+        path = directory / f"{self.directory.name}_{number}.mcap"
         library = f"mauve_rt {mauve_rt.__version__}"
-        return McapFile(path, profile="ros2", library=library, disk=self._disk)
+        room_bytes = _FILE_ROOM_BYTES if self._keeps_room else 0
+        return McapFile(path, profile="ros2", library=library, disk=self._disk, room_bytes=room_bytes)
 
-    def _metadata(self) -> Metadata:
+    def _metadata(self, *, in_place: bool = False, size: int = 0) -> Metadata:
         files = self._files()
-        topics = [_counted(topic, files) for topic in self._topics.values()]
-        text = metadata_text(files, topics, custom_data=self._custom_data, ros_distro=self._ros_distro)
-        return Metadata(self._folder, text)
+        data = metadata_text(
+            files,
+            [_counted(topic, files) for topic in self._topics.values()],
+            custom_data=self._custom_data,
+            ros_distro=self._ros_distro,
+            room_bytes=_METADATA_ROOM_BYTES if self._keeps_room and not in_place else 0,
+            size=size,
+        )
+        return Metadata(self._folder, data, in_place)
 
 
 def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:

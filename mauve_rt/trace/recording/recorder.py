@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
 from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.recording.tap import Tap
 from mauve_rt.trace.recording.trace_bag import (
     BATCHES,
@@ -32,14 +33,18 @@ __all__ = [
 
 
 _JOIN_TIMEOUT_S = 2.0
+_TRY_PERIOD_S = 1.0  # of a paused recording, to go on
 
 
 class Recorder:
     """Writes a bag from a thread of its own.
 
     The rings are emptied often by a native thread of the source, so neither a disk that makes this one wait
-    nor a busy interpreter costs records, as long as there is room to collect them. A failure to write (a full
-    disk) ends the recording, is told once through `on_error`, and leaves the bag as the flush before left it.
+    nor a busy interpreter costs records, as long as there is room to collect them.
+
+    A disk that refuses to write (it is full, limits the size of a file, fails) ends the recording, or pauses it
+    until there is room again. The reason, the ledger and the number of lost records go into the room that the
+    bag keeps.
 
     stop() takes the last records and releases the sources itself, before it waits for the disk: a later
     recording of the same sources is whole, however long the disk of this one hangs.
@@ -69,6 +74,7 @@ class Recorder:
         on_error: Callable[[str], None] | None = None,
         messages: MessageSource | None = None,
         keeper: Path | None = None,
+        waits_for_room: bool = False,
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -84,6 +90,7 @@ class Recorder:
             messages: asked, on the recorder thread, for messages beside those given to record().
             keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
+            waits_for_room: a disk that refuses to write pauses the recording; else it ends the recording.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -93,6 +100,8 @@ class Recorder:
         self._drain_period_s = min(drain_period_s, flush_period_s)
         self._queue_bytes = queue_bytes
         self._on_error = on_error
+        self._waits_for_room = waits_for_room
+        self._try_at_s = 0.0  # when paused
         self._tap = Tap(source, messages)
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
@@ -127,7 +136,7 @@ class Recorder:
 
     @property
     def error(self) -> str:
-        """Why it ended by itself; empty when it did not."""
+        """Why it ended by itself, or is paused; empty when it did not."""
         with self._lock:
             return self._error
 
@@ -218,12 +227,21 @@ class Recorder:
         try:
             next_s = time.monotonic()
             while not self._stop.wait(max(0.0, next_s - time.monotonic())):
-                self._write()
-                self._bag.flush()
+                if self._bag.is_interrupted:
+                    self._try_to_go_on()
+                else:
+                    self._write()
+                    self._flush(self._bag.flush)
                 next_s = max(next_s + self._flush_period_s, time.monotonic())
             self._tap.close()
-            self._write()
-            self._bag.close()
+            if self._bag.is_interrupted:
+                self._try_at_s = 0.0
+                self._try_to_go_on()
+            else:
+                self._write()
+            if not self._bag.is_interrupted:
+                self._flush(self._bag.finish)
+            self._bag.abort()
             with self._lock:
                 self._recording = False
         except BaseException as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
@@ -235,6 +253,71 @@ class Recorder:
         finally:
             with contextlib.suppress(Exception):  # the recording has ended, and why is reported
                 self._tap.close()
+
+    def _flush(self, flush: Callable[[], None]) -> None:
+        try:
+            flush()
+        except DiskError as error:
+            if self._waits_for_room:
+                self._interrupt(error)
+                self._pause(str(error))
+                return
+            with self._lock:
+                self._recording = False
+            self._tap.close()
+            self._interrupt(error)
+            raise
+
+    def _pause(self, reason: str) -> None:
+        self._try_at_s = time.monotonic() + _TRY_PERIOD_S
+        error = f"recording paused until the disk has room again: {reason}"
+        with self._lock:
+            self._error = error
+        self._report(error)
+
+    def _interrupt(self, error: DiskError) -> None:
+        """Count what is lost with the flush that failed, and what came since."""
+        lost = self._bag.interrupt(str(error))
+        with self._lock:
+            self._lost += lost
+        self._skip()
+        self._write_last_words()
+
+    def _skip(self) -> None:
+        """Count what came: it is lost."""
+        with self._lock:
+            waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
+        drain, taken = self._tap.take()
+        more = Counter(message.topic for message in taken)
+        with self._lock:
+            self._received += more
+            self._lost += more + Counter(message.topic for message in waiting)
+            received, lost = self._received.copy(), self._lost.copy()
+        self._bag.skip(drain)
+        self._bag.tell_ledger(received, lost)
+        self._bag.tell_dropped(self.dropped_messages)
+
+    def _write_last_words(self) -> None:
+        try:
+            self._bag.write_last_words()
+        except TraceError as error:
+            self._report(f"the bag does not tell what it lost: {error}")
+
+    def _try_to_go_on(self) -> None:
+        """Once a second, since a new file is made for it."""
+        self._skip()
+        if time.monotonic() < self._try_at_s:
+            return
+        self._try_at_s = time.monotonic() + _TRY_PERIOD_S
+        try:
+            missed = self._bag.go_on()
+        except DiskError:
+            self._write_last_words()
+            return
+        with self._lock:
+            self._error = ""
+        paused_s = (missed.until_ns - missed.from_ns) / 1e9
+        self._report(f"recording goes on after {paused_s:.1f} s: {missed.records:,} records are lost")
 
     def _write(self) -> None:
         with self._lock:  # before the tap: then no message is later than the clock pair that maps it

@@ -1,10 +1,14 @@
 """The keeper writes a bag's files: a kill of the recording process finds each write done, or not begun."""
 
 import errno
+import json
 import os
+import resource
 import shutil
 import signal
+import subprocess
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +29,7 @@ from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER
 
 
 @pytest.fixture(autouse=True)
@@ -256,6 +261,157 @@ def test_a_disk_that_cannot_sync_ends_the_recording(tmp_path: Path, calls: DiskC
     until(lambda: not recorder.recording, "its end")
     assert recorder.stop()
     assert "Input/output error" in errors[0]
+
+
+# ---- a disk that refuses to write: what was lost is in the bag
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 400 kB."""
+    place = tmp_path / "small"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(place)]
+    if subprocess.run(mount, check=False, capture_output=True, timeout=60).returncode != 0:
+        pytest.skip("no rights to mount a small file system")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True, timeout=60)
+
+
+def text_of(size: int) -> bytes:
+    return bytes([0, 1, 0, 0]) + size.to_bytes(4, "little") + b"x" * (size - 1) + bytes(1)
+
+
+class Fed:
+    """A recorder that a test gives records and messages, and what became of them by its own count."""
+
+    def __init__(self, directory: Path, keeper: Path | None, *, waits: bool) -> None:
+        self.errors: list[str] = []
+        self.source = SyntheticSource(["c"])
+        self.recorder = Recorder(
+            self.source,
+            directory,
+            node_name="/executor",
+            keeper=keeper,
+            flush_period_s=0.02,
+            on_error=self.errors.append,
+            waits_for_room=waits,
+        )
+        self.messages = 0
+        self.recorder.start()
+
+    @property
+    def records(self) -> int:
+        """What the recorder has taken."""
+        return self.source._written[0] - len(self.source._waiting)
+
+    def feed(self) -> None:
+        """One record, one message of 3 kB."""
+        now = self.source._written[0]
+        self.source.add("c", Kind.MARK, now)
+        if self.recorder.record("/words", TEXT, text_of(3000), monotonic_ns=now):
+            self.messages += 1
+        time.sleep(0.01)
+
+    def is_refused(self) -> bool:
+        """Whether the disk refused to write, after more was fed."""
+        self.feed()
+        return bool(self.errors)
+
+    def assert_told(self, reason: str, *, count: int = 1) -> None:
+        """The bag tells how much of what was fed is not in it, and why."""
+        bag = self.recorder.directory
+        state = examine_bag(bag)
+        assert state.damages() == []
+        assert_rosbag2_reads(bag)
+        trace = open_trace(bag)
+        recorded = sum(1 for _ in trace.messages("/words"))
+        ledger = json.loads(state.custom_data[LEDGER])["/words"]
+        assert ledger["received"] >= self.messages
+        assert ledger["received"] - ledger["lost"] == recorded
+        assert int(state.custom_data[DROPPED_MESSAGES]) == ledger["lost"] > 0
+        told = json.loads(state.custom_data[INTERRUPTIONS])
+        assert len(told) == count
+        assert all(reason in one["reason"] for one in told)
+        assert sum(one["records"] for one in told) == self.records - len(trace.of("c"))
+        losses = [finding.text for finding in check_bag(bag) if finding.is_loss]
+        assert any(reason in text for text in losses)
+
+
+@pytest.mark.parametrize("keeper", [None, KEEPER], ids=["direct", "kept"])
+def test_a_full_disk_leaves_its_losses_in_the_bag(small_disk: Path, keeper: Path | None):
+    fed = Fed(small_disk / "bag", keeper, waits=False)
+    until(fed.is_refused, "the disk to be full")
+    until(lambda: not fed.recorder.recording, "the end")
+    fed.recorder.stop()
+    assert len(fed.errors) == 1
+    assert "recording stopped" in fed.errors[0]
+    fed.assert_told("No space left on device")
+    (one,) = json.loads(examine_bag(small_disk / "bag").custom_data[INTERRUPTIONS])
+    assert one["until_ns"] == 0
+    held = {path.name for path in (small_disk / "bag").iterdir()}
+    assert held == {"bag_0.mcap", "metadata.yaml"}
+
+
+def test_a_limit_of_file_size_leaves_its_losses_in_the_bag(tmp_path: Path):
+    fed = Fed(tmp_path / "bag", KEEPER, waits=False)
+    until(lambda: fed.recorder.message_count > 3, "flushes")
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.prlimit(keeper_of(fed.recorder), resource.RLIMIT_FSIZE, (200_000, hard))
+    until(fed.is_refused, "the limit")
+    until(lambda: not fed.recorder.recording, "the end")
+    fed.recorder.stop()
+    fed.assert_told("File too large")
+
+
+def test_a_recording_goes_on_when_the_disk_has_room_again(small_disk: Path):
+    (small_disk / "in_the_way").write_bytes(bytes(250_000))
+    fed = Fed(small_disk / "bag", KEEPER, waits=True)
+    until(fed.is_refused, "the disk to be full")
+    assert "recording paused until the disk has room again" in fed.recorder.error
+    assert fed.recorder.recording
+    for _ in range(20):
+        fed.feed()
+    at_the_pause = [file.name for file in (small_disk / "bag").glob("*.mcap")]
+    assert at_the_pause == ["bag_0.mcap"]
+    (small_disk / "in_the_way").unlink()
+    until(lambda: not fed.recorder.error, "the recording to go on")
+    assert "recording goes on after" in fed.errors[-1]
+    fed.feed()
+    assert fed.recorder.stop()
+    fed.assert_told("No space left on device")
+    (one,) = json.loads(examine_bag(small_disk / "bag").custom_data[INTERRUPTIONS])
+    assert one["until_ns"] > one["from_ns"]
+    assert sorted(file.name for file in (small_disk / "bag").glob("*.mcap")) == ["bag_0.mcap", "bag_1.mcap"]
+    assert open_trace(small_disk / "bag").of("c")["time_ns"][-1] == fed.records - 1
+
+
+def test_a_recording_that_is_stopped_while_it_is_paused_leaves_its_losses(small_disk: Path):
+    fed = Fed(small_disk / "bag", KEEPER, waits=True)
+    until(fed.is_refused, "the disk to be full")
+    for _ in range(20):
+        fed.feed()
+    assert fed.recorder.stop()
+    fed.assert_told("No space left on device")
+
+
+def test_a_write_error_that_ends_is_a_pause(tmp_path: Path, calls: DiskCalls):
+    fed = Fed(tmp_path / "bag", calls.keeper, waits=True)
+    until(lambda: fed.recorder.message_count > 3, "flushes")
+    for _ in range(2):
+        calls.fail("pwrite", errno.EIO)
+        until(fed.is_refused, "the error")
+        calls.succeed()
+        until(lambda: not fed.recorder.error, "the recording to go on")
+        fed.errors.clear()
+        fed.feed()
+        until(lambda before=fed.recorder.message_count: fed.recorder.message_count > before, "a flush")
+    assert fed.recorder.stop()
+    fed.assert_told("Input/output error", count=2)
+
+
+def keeper_of(recorder: Recorder) -> int:
+    return recorder._bag._bag._disk._process
 
 
 class TappedSource(SyntheticSource):

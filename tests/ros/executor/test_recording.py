@@ -209,9 +209,37 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     reply = stop(graph)
     assert reply.success
     assert "it had ended by itself: recording stopped" in reply.message
+    (told,) = [finding for finding in check_bag(tmp_path / "bag") if "ended by itself" in finding.text]
+    assert told.is_loss
+    assert "File too large" in told.text
     assert examine_bag(tmp_path / "bag").is_finished
     assert_rosbag2_reads(tmp_path / "bag")
     assert len(mauve_rt.trace.open(tmp_path / "bag").of("counter")) > 0
+
+
+def test_a_recording_pauses_where_the_setting_says_so(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    arguments = ("-p", f"architecture:={architecture}", "-p", f"bags:={tmp_path}")
+    executor = start_executor(*arguments, "-p", "bag_waits_for_room:=true")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    assert start(graph, bag="bag").success
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    graph.spin_until(lambda: file.stat().st_size > ROOM, "records on the disk")
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    (keeper,) = children_of(executor)
+    resource.prlimit(keeper, resource.RLIMIT_FSIZE, (file.stat().st_size + MORE, hard))
+    told = "recording paused until the disk has room again"
+    graph.spin_until(lambda: told in executor.output, "the pause")
+    graph.spin_until(lambda: "recording goes on after" in executor.output, "the recording to go on")
+    reply = stop(graph)
+    assert reply.success, reply.message
+    assert "dropped" in reply.message
+    findings = check_bag(tmp_path / "bag")
+    assert any("the recording paused for" in finding.text and finding.is_loss for finding in findings)
+    assert not [finding for finding in findings if finding.is_damage]
+    assert_rosbag2_reads(tmp_path / "bag")
 
 
 def numbers_of(bag: Path) -> list[float]:
