@@ -42,7 +42,7 @@ class Recorder:
     The rings are emptied often by a native thread of the source, so neither a disk that makes this one wait
     nor a busy interpreter costs records, as long as there is room to collect them.
 
-    A disk that refuses to write (it is full, limits the size of a file, fails) ends the recording, or pauses it
+    A disk that refuses to write (it is full, limits a file, fails) ends the recording, or pauses it
     until there is room again. The reason, the ledger and the number of lost records go into the room that the
     bag keeps.
 
