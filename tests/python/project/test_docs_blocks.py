@@ -149,6 +149,8 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "mauve trace info DIR": (
             "python/cli/test_trace.py::test_info",
             "python/cli/test_trace.py::test_check_and_repair",
+            "python/trace/test_snapshot.py::"
+            "test_every_reader_reads_a_snapshot_of_a_bag_that_is_being_written",
             "python/cli/test_trace.py::test_stats",
             "python/cli/test_trace_export.py::test_perfetto_is_the_default",
         ),
