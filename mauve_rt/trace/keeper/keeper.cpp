@@ -184,15 +184,17 @@ class Writer {
   }
 
   Answer carry_out(Order order, Files files, const char* data) {
-    if (data == nullptr && order.length + order.metadata_length != 0) return {.error = ENOMEM, .is_metadata = 0};
+    if (data == nullptr && order.length + order.metadata_length != 0)
+      return {.error = ENOMEM, .is_metadata = 0};
     if (const std::int32_t error = write_file(order, files.file.get(), data); error != 0)
       return {.error = error, .is_metadata = 0};
     if (!unsynced_.is_open()) synced_at_ = Clock::now();
     unsynced_ = std::move(files.file);
-    folder_ = std::move(files.folder);
+    if (files.folder.is_open()) folder_ = std::move(files.folder);
     if (due_ms() == 0) order.flags |= kSync;
     const bool is_synced = (order.flags & kSync) != 0;
-    if (const std::int32_t error = is_synced ? sync() : 0; error != 0) return {.error = error, .is_metadata = 0};
+    if (const std::int32_t error = is_synced ? sync() : 0; error != 0)
+      return {.error = error, .is_metadata = 0};
     if (order.metadata_length != 0) {
       if (const std::int32_t error = write_metadata(order, folder_.get(), data + order.length); error != 0)
         return {.error = error, .is_metadata = 1};
