@@ -158,7 +158,7 @@ class McapFile:
             self._write_tail(0, metadata, sync=True)
 
     def write_into_room(self, metadata: Metadata) -> None:
-        """Write what set_metadata() told into the room that the end of the file keeps: it takes no other.
+        """Write what set_metadata() noted into the room that the end of the file keeps: it takes no other.
 
         Raises:
             DiskError: it does not fit, or the system refused; the file is as before.
