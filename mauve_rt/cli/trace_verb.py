@@ -151,6 +151,25 @@ def _repair(args: argparse.Namespace) -> int:
     return OK
 
 
+def _add_snapshot(parser: argparse.ArgumentParser) -> None:
+    _add_bag(parser)
+    parser.add_argument(
+        "--out", type=Path, metavar="DIR", help="the copy (default: BAG_snapshot, in the current folder)"
+    )
+
+
+def _snapshot(args: argparse.Namespace) -> int:
+    from mauve_rt.cli.progress import shown  # noqa: PLC0415
+    from mauve_rt.trace.bag.snapshot import snapshot_bag  # noqa: PLC0415
+
+    bag = one_bag(args.bag)
+    out = args.out or Path(f"{bag.resolve().stem}_snapshot")
+    with shown() as progress:
+        snapshot_bag(bag, out, progress=progress)
+    print(out)
+    return OK
+
+
 def _stats(args: argparse.Namespace) -> int:
     from mauve_rt.cli.progress import shown  # noqa: PLC0415
     from mauve_rt.cli.tables import print_tables  # noqa: PLC0415
@@ -178,6 +197,7 @@ SUB_VERBS = (
         _check,
     ),
     Verb("repair", "complete a bag that a kill or a full disk left incomplete", _add_bag, _repair),
+    Verb("snapshot", "copy a bag that is being written, for every reader", _add_snapshot, _snapshot),
     Verb("stats", "show times and counts of components, states and services", _add_bag_and_json, _stats),
     Verb("export", "convert a trace for ui.perfetto.dev, or to CSV files", _add_export, _export),
 )

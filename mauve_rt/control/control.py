@@ -71,8 +71,8 @@ class Outside(Protocol):
 class Recordings(Protocol):
     """What starts and stops recordings; see `executor_recording`."""
 
-    def carry_out(self, order: RecordingOrder) -> tuple[str, str]:
-        """Start or stop; returns what was done, in words, and the bag's folder.
+    def carry_out(self, order: RecordingOrder) -> Outcome:
+        """Start or stop. From any thread; may wait for a disk.
 
         Raises:
             RefusalError: and nothing was started or stopped.
@@ -85,6 +85,7 @@ class Control:
     Changes, which may take long to prepare, are carried out one at a time. A stop or a start by itself waits
     for none of them: it takes no lock but the kernel's, of that one component. What it does to a component
     that a change prepared meanwhile is about, the kernel finds at the commit: the change is refused then.
+    No request waits for a recording that starts or stops: its disk may hang.
 
     | member       | written by                    | guarded by                                      |
     | ------------ | ----------------------------- | ----------------------------------------------- |
@@ -93,7 +94,7 @@ class Control:
     | `_taken`     | changes                       | `_changing`                                     |
     | the bindings | changes, in `_outside`        | `_changing`, from the plan to the commit's end  |
     | `_trials`    | reloads; the watch of verdicts | exchanged item by item                          |
-    | the bag      | orders, in `_recordings`      | `_changing`                                     |
+    | the bag      | orders, in `_recordings`      | a lock of its own: a disk may hang              |
     """
 
     def __init__(
@@ -140,7 +141,7 @@ class Control:
                 self._under_way[identity] = request
         outcome: Outcome | None = None
         try:
-            if request.is_direct:
+            if request.is_direct or request.recording is not None:
                 outcome = self._outcome(request)
             else:
                 with self._changing, self._runtime.changing(str(request)):
@@ -403,8 +404,7 @@ class Control:
         check_revision(request, self._runtime)
         if self._recordings is None:
             raise RefusalError(Code.UNSUPPORTED, "this executor does not record by request")
-        message, bag = self._recordings.carry_out(order)
-        return Outcome(code=Code.OK, message=message, bag=bag)
+        return self._recordings.carry_out(order)
 
     @contextmanager
     def _bound(self, bound: Bound, *, dry_run: bool) -> Iterator[None]:

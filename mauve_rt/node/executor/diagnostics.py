@@ -303,6 +303,8 @@ class Diagnostics:
         remarks = self._grown("recording", {"messages dropped": status.dropped})
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         message = "; ".join(remarks) or ("recording" if status.recording else "stopped")
+        if not (status.recording or status.is_complete):
+            level, message = DiagnosticStatus.ERROR, "stopped, not complete: its disk has not answered"
         if status.error:
             level, message = DiagnosticStatus.ERROR, status.error
         values: dict[str, object] = {

@@ -16,7 +16,7 @@ from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import monotonic_ns
 from mauve_rt.control.recorded_values import RecordedValues, choose
-from mauve_rt.control.requests import Code, RecordingOrder, RefusalError
+from mauve_rt.control.requests import Code, Outcome, RecordingOrder, RefusalError
 from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.interfaces.descriptions import trace_architecture
@@ -70,15 +70,24 @@ class RecordingStatus:
     """In the bag, the trace's own among them."""
     dropped: int
     error: str
-    """Why it ended by itself; empty when it did not."""
+    """Why it ended by itself, or is paused; empty when it did not."""
+    is_complete: bool
+    """The recording has ended, and the bag is closed."""
+
+
+class RecordingBusyError(MauveError):
+    """A recording is under way, or starts."""
 
 
 class Recording:
     """Records into one bag at a time, from a start to a stop. From any thread.
 
+    A bag is made without the lock: while a start waits for its disk, a stop calls the start off at once.
+
     | member           | written by       | guarded by      |
     | ---------------- | ---------------- | --------------- |
     | `_recorder`      | start(), stop()  | exchanged whole |
+    | `_is_starting`, `_is_called_off` | start(), stop() | `_lock` |
     | `_shadows`       | start()          | `_lock`         |
     | `_subscriptions` | start(), stop()  | `_lock`         |
     | `_chosen`        | start(), stop()  | exchanged whole |
@@ -87,23 +96,34 @@ class Recording:
     """
 
     def __init__(
-        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, *, data_group: CallbackGroup
+        self,
+        node: LifecycleNode,
+        runtime: Runtime,
+        bound: BoundResources,
+        *,
+        data_group: CallbackGroup,
+        waits_for_room: bool = False,
     ) -> None:
-        """Take the node whose trace it is; chosen topics are received in `data_group`."""
+        """Take the node whose trace it is; chosen topics are received in `data_group`.
+
+        `waits_for_room`: a disk that refuses to write pauses a recording; else it ends it.
+        """
         self._node = node
         self._runtime = runtime
         self._bound = bound
         self._data_group = data_group
+        self._waits_for_room = waits_for_room
         self._lock = threading.RLock()
         self._recorder: Recorder | None = None
         self._shadows: RecordedShadows | None = None
-        self._last: RecordingStatus | None = None
+        self._last: Recorder | None = None  # its disk may still write
+        self._is_starting = self._is_called_off = False
         self._subscriptions: list[Any] = []
         self._chosen: tuple[ChosenTopic, ...] = ()
         self._told: set[tuple[str, str]] = set()  # topics, and types of others on them
 
     def start(self, bag: Path, topics: Sequence[str], *, split: Split, values: Sequence[str] = ()) -> Path:
-        """Create the bag and record from now on; returns its folder, absolute. Another recording ends.
+        """Create the bag and record from now on; returns its folder, absolute.
 
         Args:
             bag: the folder, which must not exist yet.
@@ -116,7 +136,8 @@ class Recording:
         Raises:
             ParameterError: a value is not there; a topic is written otherwise, nobody knows its type, that is
                 not installed, or the topic is used with another one.
-            TraceError: the folder exists already or cannot be written.
+            RecordingBusyError: a recording is under way, or starts.
+            TraceError: the folder exists already or cannot be written, or stop() called this start off.
 
         """
         from mauve_rt.native_program import native_program  # noqa: PLC0415 - a start without a bag needs none
@@ -128,36 +149,78 @@ class Recording:
             recorded = choose(self._runtime, [*self._runtime.model.recorded, *values], name)
         except MauveError as error:
             raise ParameterError(str(error)) from error
-        with self._lock:
-            self.stop()
-            self._subscribe(chosen)  # first: what is refused here leaves no folder behind
-            self._shadows = RecordedShadows(self._runtime, name, _serialized)
+        self._begin(chosen)  # first: what is refused here leaves no folder behind
+        try:
+            shadows = RecordedShadows(self._runtime, name, _serialized)
             recorder = Recorder(
                 self._runtime.host,
                 bag.absolute(),
                 node_name=name,
                 split=split,
                 on_error=self._node.get_logger().error,
-                messages=_Sources(self._bound, RecordedValues(self._runtime, recorded), self._shadows),
+                messages=_Sources(self._bound, RecordedValues(self._runtime, recorded), shadows),
                 keeper=native_program("bag_keeper"),
+                waits_for_room=self._waits_for_room,
             )
-            recorder.tell_architecture(self._architecture(self._runtime.observe()))
+            try:
+                self._record_into(recorder, shadows, chosen)
+            except BaseException:
+                recorder.stop()
+                raise
+        except BaseException:
+            with self._lock:
+                self._unsubscribe()
+            raise
+        finally:
+            with self._lock:
+                self._is_starting = False
+        return recorder.directory
+
+    def _begin(self, chosen: tuple[ChosenTopic, ...]) -> None:
+        with self._lock:
+            if self._is_starting:
+                text = (
+                    "a recording is being started: its disk has not answered yet; stop_recording calls it off"
+                )
+                raise RecordingBusyError(text)
+            if self.recording:
+                raise RecordingBusyError("it records already; stop that first")
+            self.stop()
+            self._subscribe(chosen)
+            self._is_starting, self._is_called_off = True, False
+
+    def _record_into(
+        self, recorder: "Recorder", shadows: RecordedShadows, chosen: tuple[ChosenTopic, ...]
+    ) -> None:
+        architecture = self._architecture(self._runtime.observe())
+        with self._lock:
+            if self._is_called_off:
+                raise TraceError(
+                    f"bag {recorder.directory}: a stop called its recording off; the bag is empty"
+                )
+            recorder.tell_architecture(architecture)
             recorder.start(discard=self._runtime.active)
-            self._recorder, self._chosen = recorder, chosen
-            return recorder.directory
+            self._recorder, self._shadows, self._chosen = recorder, shadows, chosen
 
     def stop(self) -> RecordingStatus | None:
-        """Seal the bag; returns how it went, None when nothing was recorded. May be called again."""
+        """Seal the bag; returns how it went, None when nothing was recorded. May be called again.
+
+        Where the disk does not answer within 2 s, the status is not complete, and an error is logged.
+        """
         with self._lock:
             recorder = self._recorder
             self._unsubscribe()
-            if recorder is not None:
-                if self._shadows is not None:
-                    self._shadows.finish()
-                recorder.stop()
-                self._last = self.status()
-                self._recorder = None
-            return self._last if recorder is not None else None
+            self._is_called_off = self._is_starting
+            if recorder is None:
+                return None
+            if self._shadows is not None:
+                self._shadows.finish()
+            is_complete = recorder.stop()
+            self._last, self._recorder = recorder, None
+            status = _status(recorder)
+        if not is_complete:
+            self._node.get_logger().error(not_complete(status))
+        return status
 
     @property
     def recording(self) -> bool:
@@ -167,16 +230,8 @@ class Recording:
 
     def status(self) -> RecordingStatus | None:
         """How the present recording fares, or the last one did; None when there was none."""
-        recorder = self._recorder
-        if recorder is None:
-            return self._last
-        return RecordingStatus(
-            bag=str(recorder.directory),
-            recording=recorder.recording,
-            messages=recorder.message_count,
-            dropped=recorder.dropped_messages,
-            error=recorder.error,
-        )
+        recorder = self._recorder or self._last
+        return None if recorder is None else _status(recorder)
 
     def record(self, topic: str, type_name: str, data: bytes, *, qos: QoSProfile | None = None) -> None:
         """Record a serialized message that was sent or received now."""
@@ -298,6 +353,26 @@ class Recording:
         self._node.get_logger().warning(f"topic {topic.full_name} to record: {what}")
 
 
+def not_complete(status: RecordingStatus) -> str:
+    """Say that a recording has ended and that its disk has not written the bag yet."""
+    return (
+        f"{status.bag} is not complete: the recording has ended, and its disk has not answered for 2 s. "
+        f"{status.messages:,} messages are in the bag. Check the bag when the disk answers: "
+        f"mauve trace check {status.bag}"
+    )
+
+
+def _status(recorder: "Recorder") -> RecordingStatus:
+    return RecordingStatus(
+        bag=str(recorder.directory),
+        recording=recorder.recording,
+        messages=recorder.message_count,
+        dropped=recorder.dropped_messages,
+        error=recorder.error,
+        is_complete=recorder.is_closed,
+    )
+
+
 def _serialized(message: Any) -> bytes:
     return bytes(serialize_message(message))
 
@@ -328,8 +403,8 @@ class RecordingOrders:
         self._runtime = runtime
         self._folder = folder.absolute()
 
-    def carry_out(self, order: RecordingOrder) -> tuple[str, str]:
-        """Start or stop; returns what was done, in words, and the bag's folder.
+    def carry_out(self, order: RecordingOrder) -> Outcome:
+        """Start or stop. TIMEOUT: the recording has ended, and its bag is not complete.
 
         Raises:
             RefusalError: and nothing was started or stopped.
@@ -337,13 +412,11 @@ class RecordingOrders:
         """
         return self._start(order) if order.start else self._stop()
 
-    def _start(self, order: RecordingOrder) -> tuple[str, str]:
+    def _start(self, order: RecordingOrder) -> Outcome:
         if not self._runtime.configured:
             raise RefusalError(
                 Code.NOT_ACTIVE, "the executor is not configured; configure it first (lifecycle)"
             )
-        if self._recording.recording:
-            raise RefusalError(Code.ALREADY_RUNNING, "it records already; stop that first")
         bag = self._folder / (order.bag or f"mauve_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S}")
         if self._folder.resolve() not in bag.resolve().parents:
             text = (
@@ -355,17 +428,21 @@ class RecordingOrders:
             directory = self._recording.start(bag, order.topics, split=split, values=order.values)
         except ParameterError as error:
             raise RefusalError(Code.INVALID, str(error)) from error
+        except RecordingBusyError as error:
+            raise RefusalError(Code.ALREADY_RUNNING, str(error)) from error
         except TraceError as error:
             raise RefusalError(Code.PREPARE_FAILED, str(error)) from error
-        return f"recording into {directory}", str(directory)
+        return Outcome(code=Code.OK, message=f"recording into {directory}", bag=str(directory))
 
-    def _stop(self) -> tuple[str, str]:
+    def _stop(self) -> Outcome:
         status = self._recording.stop()
         if status is None:
             raise RefusalError(Code.NOT_RUNNING, "nothing is being recorded")
+        if not status.is_complete:
+            return Outcome(code=Code.TIMEOUT, message=not_complete(status), bag=status.bag)
         words = f"{status.messages:,} messages are in {status.bag}"
         if status.dropped:
             words += f"; {status.dropped:,} were dropped"
         if status.error:
             words += f"; it had ended by itself: {status.error}"
-        return words, status.bag
+        return Outcome(code=Code.OK, message=words, bag=status.bag)

@@ -64,10 +64,10 @@ from mauve_rt.node.shared.watch import Watch
 class Services:
     """The services of a node.
 
-    Requests for changes wait for each other (`is_change`); those to stop or start wait for nobody. They are
-    in `control_group`, lists in `query_group`. `~/list_changes` and `~/abandon_change` wait for nobody,
-    either. Who asked is answered first; then another thread tells of it
-    on ~/state and ~/events.
+    Requests for changes wait for each other (`is_change`). Requests to stop or start a component or a
+    recording wait for no other request, and so with `~/list_changes` and `~/abandon_change`. They are in
+    `control_group`, lists in `query_group`. Who asked is answered first; then another thread tells of it on
+    ~/state and ~/events.
 
     | member    | written by                | guarded by                      |
     | --------- | ------------------------- | ------------------------------- |
@@ -348,10 +348,20 @@ class _Untold(threading.local):
 
 
 def is_change(ros: Any) -> bool:
-    """Whether a request waits for those before it: all but a stop or a start by itself, and the way out."""
+    """Whether a request waits for those before it: all but those of _WAITS_FOR_NONE."""
     if isinstance(ros, Reconfigure.Request):
         return not _reconfigure(ros).is_direct
-    return not isinstance(ros, Stop.Request | Start.Request | ListChanges.Request | AbandonChange.Request)
+    return not isinstance(ros, _WAITS_FOR_NONE)
+
+
+_WAITS_FOR_NONE = (  # a stop or a start by itself, the way out, and what may wait for a disk
+    Stop.Request,
+    Start.Request,
+    ListChanges.Request,
+    AbandonChange.Request,
+    StartRecording.Request,
+    StopRecording.Request,
+)
 
 
 def _stop(ros: Any) -> Request:

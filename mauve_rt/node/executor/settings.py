@@ -34,6 +34,10 @@ PARAMETERS: dict[str, Setting] = {
     "bag_split_bytes": Setting(
         0, "size at which a recording goes on in a new file, in bytes; 0: never", _CONFIGURED, minimum=0
     ),
+    "bag_waits_for_room": Setting(
+        default=False,
+        description="a disk that is full or fails pauses a recording until it writes again; else it ends it",
+    ),
     "rules": Setting("", "rules file; the executor runs its rules `in: executor`; empty: none", _CONFIGURED),
     "rules_folder": Setting(
         "",

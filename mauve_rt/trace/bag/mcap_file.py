@@ -10,7 +10,11 @@ On disk, always:
 A flush turns the waiting messages into one chunk and writes it, followed by the new tail, over the old
 tail, in one write. The file is complete before and after it; a process killed between two flushes leaves
 all that was flushed. Inside of the write it takes a `KeptDisk`: Linux gives up a write between two pages
-when its process is killed. (Power loss is another matter: nothing here waits for the disk.)
+when its process is killed. A power loss costs what was written since the last fdatasync (`disk.py`), and the
+tail: a repair writes a new one.
+
+The tail can keep room for last words (`write_into_room`): a disk that is full, or a file that may not grow,
+takes no more, but what is in the file already can be written over.
 
 The summary is kept as bytes that only grow, so a flush costs the new messages plus the chunk indexes, never
 the file. Format: https://mcap.dev/spec.
@@ -21,15 +25,15 @@ import functools
 import os
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from mauve_rt.counts import counted
-from mauve_rt.trace.bag.disk import Disk
-from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, MetadataError
+from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
-from mauve_rt.trace.format.mcap_records import Opcode, record
+from mauve_rt.trace.format.mcap_records import Opcode, record, room
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -37,11 +41,15 @@ MAGIC = b"\x89MCAP0\r\n"
 class McapFile:
     """Writes one MCAP file. For one thread at a time."""
 
-    def __init__(self, path: Path, *, profile: str, library: str, disk: Disk | None = None) -> None:
+    def __init__(
+        self, path: Path, *, profile: str, library: str, disk: Disk | None = None, room_bytes: int = 0
+    ) -> None:
         """Create the file, which is a complete empty one as soon as there is one of that name.
 
+        `room_bytes`: kept in it for last words, until finish().
+
         Raises:
-            TraceError: it exists already or cannot be written.
+            DiskError: it exists already or cannot be written.
 
         """
         self.path = path
@@ -51,7 +59,8 @@ class McapFile:
         self._chunk = self._written = PendingChunk()
         self._chunk_indexes = bytearray()
         start = MAGIC + record(Opcode.HEADER, profile=profile, library=library)
-        self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start))
+        self._room_bytes = room_bytes
+        self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start), room_bytes)
         self._before = self._now
         self._descriptor = -1
         self._is_lost = False
@@ -69,7 +78,7 @@ class McapFile:
                 unfinished.unlink(missing_ok=True)
             self.abort()
             msg = f"bag file {path}: cannot be created ({error.strerror})"
-            raise TraceError(msg) from error
+            raise DiskError(msg) from error
 
     @property
     def size(self) -> int:
@@ -117,24 +126,75 @@ class McapFile:
         """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
         self._chunk.add(channel_id, log_time_ns, data, publish_time_ns=publish_time_ns)
 
-    def flush(self) -> None:
-        """Write what waits; the file is complete before and after.
+    def flush(self, *, metadata: Callable[[], Metadata] | None = None, sync: bool = False) -> None:
+        """Write what waits, then the metadata.yaml that tells of it; the file is complete before and after.
+
+        `sync`: all of it is on the disk afterwards.
 
         Schemas and channels wait for a message: a chunk without one has no message index, and where the first
         chunk has none, libmcap (rosbag2's reader) gives up the whole file.
 
         Raises:
-            TraceError: the system refused, e.g. the disk is full. What was flushed before is still there
-            and complete. Or the file is no longer in its place: all of it is lost.
+            DiskError: the system refused, e.g. the disk is full. What was flushed before is still there
+            and complete.
+            TraceError: the file is no longer in its place: all of it is lost.
 
         """
-        self._write_what_waits()
+        chunk, before = self._written, self._before = self._chunk, self._now
+        parts = self._build(chunk, before) if self.is_waiting else ()
+        if parts or metadata is not None or sync:
+            text = None if metadata is None else metadata()
+            self._write(parts, before.data_end, text, size=self._less_than(before), sync=sync)
+        if parts:
+            self._chunk = PendingChunk()
         self._check_place()
 
-    def _write_what_waits(self) -> None:
-        chunk, before = self._written, self._before = self._chunk, self._now
-        if not self.is_waiting:
-            return
+    def finish(self, *, metadata: Callable[[], Metadata] | None = None) -> None:
+        """As flush(), for the last time: the file keeps no room, and is on the disk."""
+        self._room_bytes = 0
+        if self.is_waiting:
+            self.flush(metadata=metadata, sync=True)
+        elif self._now.room_bytes or metadata is not None:
+            self._write_tail(0, metadata, sync=True)
+
+    def write_into_room(self, metadata: Metadata) -> None:
+        """Write what set_metadata() noted into the room that the end of the file keeps: it takes no other.
+
+        Raises:
+            DiskError: it does not fit, or the system refused; the file is as before.
+
+        """
+        room_bytes = self._now.room_bytes + len(self._now.tail) - len(self._tail_of_now())
+        if room_bytes < 0:
+            msg = f"bag file {self.path}: no room is left in it for last words, {-room_bytes} bytes too few"
+            raise DiskError(msg)
+        self._write_tail(room_bytes, lambda: metadata, sync=False)
+
+    def drop_waiting(self) -> Counts:
+        """Give up what waits for the next flush. Write no more messages then: topics are given up, too."""
+        dropped, self._chunk = self._chunk.counts, PendingChunk()
+        del self._schemas[self._now.schema_count :], self._channels[self._now.channel_count :]
+        return dropped
+
+    def _tail_of_now(self) -> bytes:
+        now = self._now
+        room = now.room_bytes
+        return self._finished(now.counts, now.chunk_count, now.data_end, now.data_crc, room).tail
+
+    def _write_tail(self, room_bytes: int, metadata: Callable[[], Metadata] | None, *, sync: bool) -> None:
+        now, self._written = self._now, self._chunk
+        self._before = now
+        self._now = self._finished(now.counts, now.chunk_count, now.data_end, now.data_crc, room_bytes)
+        text = None if metadata is None else metadata()
+        self._write((self._now.tail,), now.data_end, text, size=self._less_than(now), sync=sync)
+        self._check_place()
+
+    def _less_than(self, before: "_Finished") -> int | None:
+        """The size that the file is cut to, where it is less than it was."""
+        return self.size if self.size < before.data_end + len(before.tail) else None
+
+    def _build(self, chunk: PendingChunk, before: "_Finished") -> Sequence[bytes | bytearray]:
+        """Let `_now` be the file with that chunk; returns what is to be written behind its data."""
         parts, index = chunk.build(before.data_end)
         self._chunk_indexes += index
         self._now = self._finished(
@@ -142,13 +202,27 @@ class McapFile:
             before.chunk_count + 1,
             before.data_end + sum(map(len, parts)),
             functools.reduce(lambda crc, part: zlib.crc32(part, crc), parts, before.data_crc),
+            self._room_bytes,
         )
+        return (*parts, self._now.tail)
+
+    def _write(
+        self,
+        parts: Sequence[bytes | bytearray],
+        offset: int,
+        metadata: Metadata | None,
+        *,
+        size: int | None,
+        sync: bool,
+    ) -> None:
         try:
-            self._disk.write(self._descriptor, (*parts, self._now.tail), before.data_end)
+            self._disk.write(self._descriptor, parts, offset, size=size, metadata=metadata, sync=sync)
+        except MetadataError as error:
+            what = f"bag {self.path.parent}: {METADATA} cannot be written ({error.strerror})"
+            raise DiskError(f"{what}; {self.undo_flush()}") from error
         except OSError as error:
             msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
-            raise TraceError(msg) from error
-        self._chunk = PendingChunk()
+            raise DiskError(msg) from error
 
     def _check_place(self) -> None:
         """The system lets a file be written that has no name any longer."""
@@ -177,14 +251,14 @@ class McapFile:
         return f"the file is complete up to the flush before, {counted(self.flushed.messages, 'message')}"
 
     def close(self) -> None:
-        """Flush and close.
+        """Finish and close.
 
         Raises:
             TraceError: as flush; the file is closed all the same.
 
         """
         try:
-            self.flush()
+            self.finish()
         finally:
             self.abort()
 
@@ -194,10 +268,14 @@ class McapFile:
         if descriptor >= 0:
             os.close(descriptor)
 
-    def _finished(self, counts: Counts, chunk_count: int, data_end: int, data_crc: int) -> "_Finished":
+    def _finished(
+        self, counts: Counts, chunk_count: int, data_end: int, data_crc: int, room_bytes: int
+    ) -> "_Finished":
         summary = Summary(self._schemas, self._channels, counts, chunk_count, bytes(self._chunk_indexes))
-        tail = build_tail(summary, data_end=data_end, data_crc=data_crc, metadata=self._metadata)
-        return _Finished(counts, chunk_count, data_end, data_crc, len(self._chunk_indexes), tail)
+        kept = room(room_bytes)
+        tail = build_tail(summary, data_end=data_end, data_crc=data_crc, metadata=self._metadata, kept=kept)
+        indexed, schemas, channels = len(self._chunk_indexes), len(self._schemas), len(self._channels)
+        return _Finished(counts, chunk_count, data_end, data_crc, indexed, schemas, channels, len(kept), tail)
 
 
 class _Finished(NamedTuple):
@@ -209,6 +287,10 @@ class _Finished(NamedTuple):
     data_crc: int
     index_bytes: int
     """Of `_chunk_indexes`."""
+    schema_count: int
+    channel_count: int
+    room_bytes: int
+    """Of `tail`."""
     tail: bytes
 
 
@@ -228,11 +310,16 @@ class Summary(NamedTuple):
 
 
 def build_tail(
-    summary: Summary, *, data_end: int, data_crc: int, metadata: Mapping[str, Mapping[str, str]] | None = None
+    summary: Summary,
+    *,
+    data_end: int,
+    data_crc: int,
+    metadata: Mapping[str, Mapping[str, str]] | None = None,
+    kept: bytes = b"",
 ) -> bytes:
     """Return what closes a file whose data section ends at byte `data_end`; CRC 0: not known.
 
-    `metadata`: records, by name, that it begins with.
+    `metadata`: records, by name, that it begins with; `kept`: the record behind them.
     """
     told = [record(Opcode.METADATA, name=name, metadata=fields) for name, fields in (metadata or {}).items()]
     indexes = b""
@@ -240,6 +327,8 @@ def build_tail(
         indexes += record(Opcode.METADATA_INDEX, offset=data_end, length=len(one), name=name)
         data_end += len(one)
         data_crc = data_crc and zlib.crc32(one, data_crc)
+    data_end += len(kept)
+    data_crc = data_crc and zlib.crc32(kept, data_crc)
     end = record(Opcode.DATA_END, data_section_crc=data_crc)
     statistics = record(
         Opcode.STATISTICS,
@@ -272,4 +361,4 @@ def build_tail(
     body = b"".join((*(group for _, group in groups), *offsets))
     footer = record(Opcode.FOOTER, summary_start=summary_start, summary_offset_start=at, summary_crc=0)[:-4]
     crc = zlib.crc32(footer, zlib.crc32(body))
-    return b"".join((*told, end, body, footer, struct.pack("<I", crc), MAGIC))
+    return b"".join((*told, kept, end, body, footer, struct.pack("<I", crc), MAGIC))

@@ -179,7 +179,8 @@ class FileState:
                 )
                 crc = zlib.crc32(self._missing_indexes, crc)
                 tail = self._missing_indexes + build_tail(summary, data_end=data_end, data_crc=crc)
-                Disk().write(descriptor, (tail,), self.whole_bytes, size=self.whole_bytes + len(tail))
+                size = self.whole_bytes + len(tail)
+                Disk().write(descriptor, (tail,), self.whole_bytes, size=size, sync=True)
             finally:
                 os.close(descriptor)
         except OSError as error:

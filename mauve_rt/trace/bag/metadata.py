@@ -2,12 +2,10 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from mauve_rt.trace.format.mcap_chunk import Counts
 
-METADATA = "metadata.yaml"
 CUSTOM_DATA = "mauve_rt"
 """Name of the record by which each MCAP file tells the custom data of metadata.yaml, as of its last flush."""
 _VERSION = 9  # what Jazzy writes
@@ -40,36 +38,20 @@ def named_files(files: Sequence[BagFileCounts]) -> Sequence[BagFileCounts]:
     return [file for file in files if file.counts.messages] or files
 
 
-def write_metadata(
-    directory: Path,
+def metadata_text(
     files: Sequence[BagFileCounts],
     topics: Sequence[BagTopic],
     *,
     custom_data: Mapping[str, str],
     ros_distro: str,
-) -> None:
-    """Write the file beside and rename it into place.
+    room_bytes: int = 0,
+    size: int = 0,
+) -> bytes:
+    """Write it by hand: at every flush a YAML library would be most of the cost.
 
-    Raises:
-        OSError: the system refused; the old one is still there.
-
+    `room_bytes`: blanks behind it, so that more can be written over it on a full disk; `size`: or as many as
+    it takes to be of that size.
     """
-    temporary = directory / f".{METADATA}.new"
-    try:
-        temporary.write_text(_metadata(files, topics, custom_data, ros_distro), encoding="utf-8")
-        temporary.replace(directory / METADATA)
-    except OSError:
-        temporary.unlink(missing_ok=True)
-        raise
-
-
-def _metadata(
-    files: Sequence[BagFileCounts],
-    topics: Sequence[BagTopic],
-    custom_data: Mapping[str, str],
-    ros_distro: str,
-) -> str:
-    """Write it by hand: at every flush a YAML library would be most of the cost."""
     total = Counts()
     for file in files:
         total = total.plus(file.counts)
@@ -100,7 +82,9 @@ def _metadata(
     for file in files:
         lines += [f"    - path: {_quoted(file.name)}", *(f"      {line}" for line in _span(file.counts))]
     lines += [f"  custom_data: {{{custom}}}", f"  ros_distro: {ros_distro}"]
-    return "\n".join(lines) + "\n"
+    text = ("\n".join(lines) + "\n").encode()
+    blanks = max(room_bytes, size - len(text))
+    return text + b" " * (blanks - 1) + b"\n" if blanks > 0 else text
 
 
 def _span(counts: Counts) -> list[str]:

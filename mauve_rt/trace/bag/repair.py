@@ -2,15 +2,17 @@
 
 import contextlib
 import json
+import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mauve_rt.counts import counted
+from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata
 from mauve_rt.trace.bag.files import bag_files, is_sqlite
 from mauve_rt.trace.bag.mcap_repair import FileState, examine
-from mauve_rt.trace.bag.metadata import METADATA, BagFileCounts, BagTopic, named_files, write_metadata
+from mauve_rt.trace.bag.metadata import BagFileCounts, BagTopic, metadata_text, named_files
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.yaml.text import YamlError, read_yaml
@@ -160,14 +162,18 @@ def _write_metadata(state: BagState) -> None:
         before = _read_metadata(state.path)
     except TraceError:
         before = {}
+    text = metadata_text(
+        _named(state.files),
+        _topics(state.files),
+        custom_data=state.custom_data,
+        ros_distro=str(before.get("ros_distro") or "jazzy"),
+    )
     try:
-        write_metadata(
-            state.path,
-            _named(state.files),
-            _topics(state.files),
-            custom_data=state.custom_data,
-            ros_distro=str(before.get("ros_distro") or "jazzy"),
-        )
+        folder = os.open(state.path, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+        try:
+            Disk().write(folder, (), 0, metadata=Metadata(folder, text), sync=True)
+        finally:
+            os.close(folder)
     except OSError as error:
         msg = f"bag {state.path}: {METADATA} cannot be written ({error.strerror})"
         raise TraceError(msg) from error

@@ -1,27 +1,26 @@
 """A rosbag2 directory around MCAP files: metadata.yaml, message definitions, topics."""
 
+import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import mauve_rt
-from mauve_rt.trace.bag.disk import Disk
+from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
-from mauve_rt.trace.bag.metadata import (
-    CUSTOM_DATA,
-    METADATA,
-    BagFileCounts,
-    BagTopic,
-    named_files,
-    write_metadata,
-)
+from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
 from mauve_rt.trace.bag.recorded import TopicQos
-from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
 from mauve_rt.unfinished import beside
+
+_FILE_ROOM_BYTES, _METADATA_ROOM_BYTES = 8192, 4096
+"""Kept in a file, and in metadata.yaml, for the reason of an interruption and the counts of a hundred topics
+that came just before it."""
 
 
 @dataclass(frozen=True)
@@ -35,16 +34,25 @@ class _Topic:
 class BagWriter:
     """A bag that is a finished one at every flush, in one file or, by split(), in several.
 
-    The MCAP file is written first, metadata.yaml replaced afterwards: one that is older than the files (a
-    kill between the two) promises less than they hold, and readers open both. Where it cannot be replaced (a
-    full disk), the file goes back to what it tells. For one thread at a time.
+    The MCAP file is written first, metadata.yaml replaced afterwards, both in one order to the disk: with a
+    keeper, a kill leaves none of both newer than the other. Where metadata.yaml cannot be replaced (a full
+    disk), the file goes back to what it tells. For one thread at a time.
 
     Chunks are in order of log time: a message that waited elsewhere while an earlier flush took later ones
     gets the log time of that flush. Its publish time stays its own.
     """
 
-    def __init__(self, directory: Path, *, ros_distro: str = "jazzy", disk: Disk | None = None) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        *,
+        ros_distro: str = "jazzy",
+        disk: Disk | None = None,
+        keeps_room: bool = False,
+    ) -> None:
         """Create the folder (and its parents) with an empty, finished bag in it; closes `disk` with the bag.
+
+        `keeps_room`: until the end, for write_into_room().
 
         Raises:
             TraceError: the folder exists already, or cannot be written.
@@ -53,12 +61,14 @@ class BagWriter:
         self.directory = Path(directory)
         self._ros_distro = ros_distro
         self._disk = disk or Disk()
+        self._keeps_room = keeps_room
         self._custom_data: dict[str, str] = {}
         self._schemas: dict[str, tuple[int, Definition]] = {}
         self._topics: dict[str, _Topic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
         self._stale = True  # metadata.yaml does not tell what the files hold
         self._told: set[str] = set()  # the files that metadata.yaml names
+        self._opened = ExitStack()
         self._flushed_ns = 0  # latest log time of all that was flushed
         try:
             self._create()
@@ -80,18 +90,21 @@ class BagWriter:
             msg = f"bag folder {self.directory}: exists already; remove it or choose another name"
             raise TraceError(msg)
         try:
-            self._file = self._new_file(unfinished)
-            self._write_metadata(unfinished)
+            self._folder = os.open(unfinished, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+            self._opened.callback(os.close, self._folder)
+            self._file = self._new_file(unfinished, 0)
+            self._opened.callback(lambda: self._file.abort())  # noqa: PLW0108 - the present one
+            self._flush(sync=True)
             unfinished.rename(self.directory)
-        except TraceError:
+        except (TraceError, OSError) as error:
+            self._opened.close()
             shutil.rmtree(unfinished, ignore_errors=True)
-            raise
-        except OSError as error:
-            self._file.abort()
-            shutil.rmtree(unfinished, ignore_errors=True)
+            if isinstance(error, TraceError):
+                raise
             msg = f"bag folder {self.directory}: cannot be created ({error.strerror})"
             raise TraceError(msg) from error
         self._file.path = self.directory / self._file.path.name
+        sync_folder(self.directory.parent)
 
     @property
     def message_count(self) -> int:
@@ -166,10 +179,58 @@ class BagWriter:
             TraceError: as flush; or the new file cannot be created.
 
         """
-        self.flush()
-        self._complete.append(BagFileCounts(self._file.path.name, self._file.flushed))
-        self._file.close()
-        self._file = self._new_file(self.directory)
+        self._flush(sync=True)
+        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
+        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        self._declare()
+        before.close()
+
+    def drop_waiting(self) -> dict[str, int]:
+        """Give up what no flush could write; how many messages it was, by topic. Only go_on() helps then."""
+        by_channel = self._file.drop_waiting().by_channel
+        return {
+            name: by_channel[topic.channel_id]
+            for name, topic in self._topics.items()
+            if topic.channel_id in by_channel
+        }
+
+    def write_into_room(self) -> None:
+        """Write custom data into the room that was kept: a full disk takes it, too.
+
+        Raises:
+            DiskError: it does not fit, or the disk failed.
+
+        """
+        self._file.set_metadata(CUSTOM_DATA, self._custom_data)
+        size = os.stat(METADATA, dir_fd=self._folder).st_size
+        metadata = self._metadata(in_place=True, size=size)
+        if len(metadata.data) > size:
+            msg = f"bag {self.directory}: {METADATA} has no room left for last words"
+            raise DiskError(msg)
+        self._file.write_into_room(metadata)
+
+    def go_on(self, begin: Callable[[], None]) -> None:
+        """Go on in a new file, behind a flush that failed; `begin` writes what it begins with.
+
+        Raises:
+            DiskError: as flush; the bag is as before.
+
+        """
+        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
+        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        try:
+            self._declare()
+            begin()
+            self._flush(sync=True)
+        except TraceError:
+            self._file.abort()
+            self._file.path.unlink(missing_ok=True)
+            self._complete.pop()
+            self._file = before
+            raise
+        before.abort()
+
+    def _declare(self) -> None:
         for _, definition in self._schemas.values():  # in the same order: they get the same numbers
             _declare_schema(self._file, definition)
         for topic in self._topics.values():
@@ -183,36 +244,49 @@ class BagWriter:
             TraceError: the system refused; the bag stays as the flush before left it. Call abort() then.
 
         """
+        self._flush(sync=False)
+
+    def finish(self) -> None:
+        """Flush for the last time: no room is kept any longer, and all of it is on the disk.
+
+        Raises:
+            TraceError: as flush.
+
+        """
+        self._stale = self._stale or self._keeps_room
+        self._keeps_room = False
+        self._flush(sync=True, is_last=True)
+
+    def _flush(self, *, sync: bool, is_last: bool = False) -> None:
         if self._file.is_waiting:
             self._stale = True
         if self._custom_data:
             self._file.set_metadata(CUSTOM_DATA, self._custom_data)
-        self._file.flush()
+        metadata = self._metadata if self._stale else None
+        if is_last:
+            self._file.finish(metadata=metadata)
+        else:
+            self._file.flush(metadata=metadata, sync=sync)
         if self._stale:
-            try:
-                self._write_metadata(self.directory)
-            except OSError as error:
-                kept = self._file.undo_flush()
-                msg = f"bag {self.directory}: {METADATA} cannot be written ({error.strerror}); {kept}"
-                raise TraceError(msg) from error
-            self._stale = False
+            self._told = {file.name for file in self._files()}
+        self._stale = False
         self._flushed_ns = max(self._flushed_ns, self._file.flushed.end_ns)
 
     def close(self) -> None:
-        """Flush and close.
+        """Flush, have all of it on the disk, and close.
 
         Raises:
             TraceError: as flush; the bag is closed all the same.
 
         """
         try:
-            self.flush()
+            self.finish()
         finally:
             self.abort()
 
     def abort(self) -> None:
         """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
-        self._file.abort()
+        self._opened.close()
         if self._complete and self._file.path.name not in self._told:  # new and empty
             self._file.path.unlink(missing_ok=True)
         self._disk.close()
@@ -236,17 +310,23 @@ class BagWriter:
     def _files(self) -> Sequence[BagFileCounts]:
         return named_files([*self._complete, BagFileCounts(self._file.path.name, self._file.flushed)])
 
-    def _new_file(self, directory: Path) -> McapFile:
-        path = directory / f"{self.directory.name}_{len(self._complete)}.mcap"
+    def _new_file(self, directory: Path, number: int) -> McapFile:
+        path = directory / f"{self.directory.name}_{number}.mcap"
         library = f"mauve_rt {mauve_rt.__version__}"
-        return McapFile(path, profile="ros2", library=library, disk=self._disk)
+        room_bytes = _FILE_ROOM_BYTES if self._keeps_room else 0
+        return McapFile(path, profile="ros2", library=library, disk=self._disk, room_bytes=room_bytes)
 
-    def _write_metadata(self, directory: Path) -> None:
-        topics = [_counted(topic, self._files()) for topic in self._topics.values()]
-        write_metadata(
-            directory, self._files(), topics, custom_data=self._custom_data, ros_distro=self._ros_distro
+    def _metadata(self, *, in_place: bool = False, size: int = 0) -> Metadata:
+        files = self._files()
+        data = metadata_text(
+            files,
+            [_counted(topic, files) for topic in self._topics.values()],
+            custom_data=self._custom_data,
+            ros_distro=self._ros_distro,
+            room_bytes=_METADATA_ROOM_BYTES if self._keeps_room and not in_place else 0,
+            size=size,
         )
-        self._told = {file.name for file in self._files()}
+        return Metadata(self._folder, data, in_place)
 
 
 def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:

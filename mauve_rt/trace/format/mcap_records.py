@@ -10,6 +10,7 @@ from typing import Any
 
 HEAD = struct.Struct("<BQ")
 """What a record begins with: opcode, length."""
+_ROOM = 0x80  # the first opcode that the format leaves to applications; readers pass over it
 
 
 class Opcode(IntEnum):
@@ -52,6 +53,12 @@ def record(opcode: Opcode, **fields: Any) -> bytes:
     """Return a whole record, its opcode and length before it. Fields are named as in the library."""
     body = b"".join(_built(code, fields[name]) for name, code in _FIELDS[opcode])
     return HEAD.pack(opcode, len(body)) + body
+
+
+def room(size: int) -> bytes:
+    """Return a record of that size that tells nothing; none where the size is less than a record's."""
+    length = size - HEAD.size
+    return HEAD.pack(_ROOM, length) + bytes(length) if length >= 0 else b""
 
 
 def _built(code: str, value: Any) -> bytes:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mauve_rt.counts import counted
 from mauve_rt.trace.bag.files import is_sqlite
 from mauve_rt.trace.bag.repair import BagState, examine_bag
 from mauve_rt.trace.format.records import Kind
@@ -15,7 +16,7 @@ from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, LEDGER, Entry
+from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry, Interruption
 
 
 @dataclass(frozen=True)
@@ -51,6 +52,7 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         return found
     trace = open_trace(path, progress=part(progress, 0.5, 1.0))
     found += [Finding(_words(name, loss), is_loss=True) for name, loss in trace.losses.items() if loss.lost]
+    found += [Finding(_interruption_words(one), is_loss=True) for one in _interruptions(state)]
     ledger = _ledger(state)
     found += [Finding(text, is_loss=True) for text in _missing(state, ledger)]
     if dropped := _dropped_messages(state) - sum(entry.lost for entry in ledger.values()):
@@ -106,6 +108,19 @@ def _ledger(state: BagState) -> Mapping[str, Entry]:
         return {topic: Entry(**fields) for topic, fields in told.items()}
     except (ValueError, TypeError, AttributeError):  # somebody else wrote it
         return {}
+
+
+def _interruptions(state: BagState) -> list[Interruption]:
+    try:
+        return [Interruption(**fields) for fields in json.loads(state.custom_data.get(INTERRUPTIONS, "[]"))]
+    except (ValueError, TypeError):  # somebody else wrote it
+        return []
+
+
+def _interruption_words(one: Interruption) -> str:
+    paused = f"the recording paused for {(one.until_ns - one.from_ns) / 1e9:.1f} s"
+    what = paused if one.until_ns else "the recording ended by itself"
+    return f"{what} ({one.reason}): {counted(one.records, 'record')} lost"
 
 
 def _missing(state: BagState, ledger: Mapping[str, Entry]) -> Iterator[str]:

@@ -1,5 +1,6 @@
 """Records an executor's trace, and whatever messages it is given, into a bag while the executor runs."""
 
+import contextlib
 import threading
 import time
 from collections import Counter
@@ -8,6 +9,8 @@ from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
 from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.errors import DiskError, TraceError
+from mauve_rt.trace.recording.tap import Tap
 from mauve_rt.trace.recording.trace_bag import (
     BATCHES,
     DROPPED_MESSAGES,
@@ -30,14 +33,21 @@ __all__ = [
 
 
 _JOIN_TIMEOUT_S = 2.0
+_TRY_PERIOD_S = 1.0  # of a paused recording, to go on
 
 
 class Recorder:
     """Writes a bag from a thread of its own.
 
     The rings are emptied often by a native thread of the source, so neither a disk that makes this one wait
-    nor a busy interpreter costs records, as long as there is room to collect them. A failure to write (a full
-    disk) ends the recording, is told once through `on_error`, and leaves the bag as the flush before left it.
+    nor a busy interpreter costs records, as long as there is room to collect them.
+
+    A disk that refuses to write (it is full, limits a file, fails) ends the recording, or pauses it
+    until there is room again. The reason, the ledger and the number of lost records go into the room that the
+    bag keeps.
+
+    stop() takes the last records and releases the sources itself, before it waits for the disk: a later
+    recording of the same sources is whole, however long the disk of this one hangs.
 
     Log times are CLOCK_REALTIME: monotonic times are mapped by the clock pair of their drain.
 
@@ -64,6 +74,7 @@ class Recorder:
         on_error: Callable[[str], None] | None = None,
         messages: MessageSource | None = None,
         keeper: Path | None = None,
+        waits_for_room: bool = False,
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -79,18 +90,19 @@ class Recorder:
             messages: asked, on the recorder thread, for messages beside those given to record().
             keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
+            waits_for_room: a disk that refuses to write pauses the recording; else it ends the recording.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
 
         """
-        self._source = source
         self._flush_period_s = flush_period_s
         self._drain_period_s = min(drain_period_s, flush_period_s)
         self._queue_bytes = queue_bytes
         self._on_error = on_error
-        self._messages = messages
-        self._dropped_before = messages.dropped_messages() if messages is not None else 0
+        self._waits_for_room = waits_for_room
+        self._try_at_s = 0.0  # when paused
+        self._tap = Tap(source, messages)
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
             source, directory, node_name=node_name, on_error=self._report, split=split, disk=disk
@@ -115,11 +127,16 @@ class Recorder:
     def recording(self) -> bool:
         """False before start(), after stop(), and after a failure."""
         with self._lock:
-            return self._recording
+            return self._recording and not self._stop.is_set()
+
+    @property
+    def is_closed(self) -> bool:
+        """Whether it has ended, and waits for the disk no longer."""
+        return self._stop.is_set() and not self._thread.is_alive()
 
     @property
     def error(self) -> str:
-        """Why it ended by itself; empty when it did not."""
+        """Why it ended by itself, or is paused; empty when it did not."""
         with self._lock:
             return self._error
 
@@ -131,9 +148,9 @@ class Recorder:
     @property
     def dropped_messages(self) -> int:
         """Messages that were to be recorded and did not get into the bag."""
-        elsewhere = self._messages.dropped_messages() if self._messages is not None else 0
+        elsewhere = self._tap.dropped_messages()
         with self._lock:
-            return self._lost.total() + elsewhere - self._dropped_before
+            return self._lost.total() + elsewhere
 
     def start(self, *, discard: bool = False) -> None:
         """Start the thread. Once only.
@@ -142,11 +159,9 @@ class Recorder:
             discard: leave out what the rings hold already, from before.
 
         """
-        self._source.collect_trace(round(self._drain_period_s * 1e9))
-        if discard:
-            self._bag.discard(self._source.drain_trace())
-        if self._messages is not None:
-            self._messages.keep_messages(on=True)
+        discarded = self._tap.open(round(self._drain_period_s * 1e9), discard=discard)
+        if discarded is not None:
+            self._bag.discard(discarded)
         with self._lock:
             self._recording = True
         self._thread.start()
@@ -173,6 +188,8 @@ class Recorder:
 
         """
         with self._lock:
+            if self._stop.is_set():
+                return False
             self._received[topic] += 1
             if not self._recording or self._waiting_bytes + len(data) > self._queue_bytes:
                 self._lost[topic] += 1
@@ -187,25 +204,46 @@ class Recorder:
             self._received[topic] += count
             self._lost[topic] += count
 
-    def stop(self) -> None:
-        """Drain and flush a last time, close the bag. Returns within 2 s; may be called again."""
-        self._stop.set()
+    def stop(self) -> bool:
+        """Take the last records, flush, close the bag. May be called again.
+
+        Returns:
+            False when the disk did not answer within 2 s: the bag is not complete. The recorder thread
+            waits on, and completes the bag.
+
+        """
+        with self._lock:
+            self._stop.set()
+        with contextlib.suppress(Exception):  # the recorder thread meets and reports it
+            self._tap.close()
         if self._thread.ident is None:
             self._bag.abort()
-        elif self._thread is not threading.current_thread():
+            return True
+        if self._thread is not threading.current_thread():
             self._thread.join(_JOIN_TIMEOUT_S)
+        return not self._thread.is_alive()
 
     def _run(self) -> None:
         try:
             next_s = time.monotonic()
             while not self._stop.wait(max(0.0, next_s - time.monotonic())):
-                self._write()
-                self._bag.flush()
+                if self._bag.is_interrupted:
+                    self._try_to_go_on()
+                else:
+                    self._write()
+                    self._flush(self._bag.flush)
                 next_s = max(next_s + self._flush_period_s, time.monotonic())
+            self._tap.close()
+            if self._bag.is_interrupted:
+                self._try_at_s = 0.0
+                self._try_to_go_on()
+            else:
+                self._write()
+            if not self._bag.is_interrupted:
+                self._flush(self._bag.finish)
+            self._bag.abort()
             with self._lock:
                 self._recording = False
-            self._write()
-            self._bag.close()
         except BaseException as error:  # noqa: BLE001 - whatever ends the recording, the executor lives on
             with self._lock:
                 self._recording = False
@@ -213,22 +251,85 @@ class Recorder:
             self._bag.abort()
             self._report(self._error)
         finally:
-            self._source.collect_trace(0)
-            if self._messages is not None:
-                self._messages.keep_messages(on=False)
+            with contextlib.suppress(Exception):  # the recording has ended, and why is reported
+                self._tap.close()
+
+    def _flush(self, flush: Callable[[], None]) -> None:
+        try:
+            flush()
+        except DiskError as error:
+            if self._waits_for_room:
+                self._interrupt(error)
+                self._pause(str(error))
+                return
+            with self._lock:
+                self._recording = False
+            self._tap.close()
+            self._interrupt(error)
+            raise
+
+    def _pause(self, reason: str) -> None:
+        self._try_at_s = time.monotonic() + _TRY_PERIOD_S
+        error = f"recording paused until the disk has room again: {reason}"
+        with self._lock:
+            self._error = error
+        self._report(error)
+
+    def _interrupt(self, error: DiskError) -> None:
+        """Count what is lost with the flush that failed, and what came since."""
+        lost = self._bag.interrupt(str(error))
+        with self._lock:
+            self._lost += lost
+        self._skip()
+        self._write_last_words()
+
+    def _skip(self) -> None:
+        """Count what came: it is lost."""
+        with self._lock:
+            waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
+        drain, taken = self._tap.take()
+        more = Counter(message.topic for message in taken)
+        with self._lock:
+            self._received += more
+            self._lost += more + Counter(message.topic for message in waiting)
+            received, lost = self._received.copy(), self._lost.copy()
+        self._bag.skip(drain)
+        self._bag.tell_ledger(received, lost)
+        self._bag.tell_dropped(self.dropped_messages)
+
+    def _write_last_words(self) -> None:
+        try:
+            self._bag.write_last_words()
+        except TraceError as error:
+            self._report(f"the bag does not tell what it lost: {error}")
+
+    def _try_to_go_on(self) -> None:
+        """Once a second, since a new file is made for it."""
+        self._skip()
+        if time.monotonic() < self._try_at_s:
+            return
+        self._try_at_s = time.monotonic() + _TRY_PERIOD_S
+        try:
+            missed = self._bag.go_on()
+        except DiskError:
+            self._write_last_words()
+            return
+        with self._lock:
+            self._error = ""
+        paused_s = (missed.until_ns - missed.from_ns) / 1e9
+        self._report(f"recording goes on after {paused_s:.1f} s: {missed.records:,} records are lost")
 
     def _write(self) -> None:
-        with self._lock:  # before the drain: then no message is later than the clock pair that maps it
+        with self._lock:  # before the tap: then no message is later than the clock pair that maps it
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
             architecture = self._architecture
             received, lost = (
                 self._received.copy(),
                 self._lost.copy(),
             )  # with what waits: the bag tells of no more
-        taken = self._messages.take_messages() if self._messages is not None else ()
+        drain, taken = self._tap.take()
         more = Counter(message.topic for message in taken)
         waiting += taken
-        drain = self._source.drain_trace()
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)

@@ -82,8 +82,7 @@ class SyntheticSource:
 
     def drain_trace(self) -> SyntheticDrain:
         """Take all records."""
-        records = b"".join(self._waiting)
-        self._waiting.clear()
+        records = b"".join([self._waiting.popleft() for _ in range(len(self._waiting))])
         realtime_ns = self.now_ns + self.realtime_offset_ns
         return SyntheticDrain(records, list(self._written), list(self._dropped), self.now_ns, realtime_ns)
 

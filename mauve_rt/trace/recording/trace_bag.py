@@ -1,6 +1,8 @@
 """The bag of one executor: its trace, and whatever messages it is given. For one thread at a time."""
 
+import functools
 import json
+import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -20,6 +22,10 @@ DROPPED_MESSAGES = "mauve_dropped_messages"
 LEDGER = "mauve_topics"
 """Key in the custom data of metadata.yaml: a JSON object of each topic's Entry. What is in the bag of it is
 `received - lost + repeated` messages."""
+INTERRUPTIONS = "mauve_interruptions"
+"""Key in the custom data of metadata.yaml: a JSON list of each Interruption."""
+_MOST_INTERRUPTIONS, _LONGEST_REASON = 16, 400
+_RECORD_BYTES = 48
 _KEPT_MESSAGES, _KEPT_BYTES = 16, 8 * 1024 * 1024  # of a latched topic of others, for the files to come
 _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
@@ -97,6 +103,18 @@ class Entry(NamedTuple):
         return self.received - self.lost + self.repeated
 
 
+class Interruption(NamedTuple):
+    """A time in which nothing got into the bag."""
+
+    reason: str
+    from_ns: int
+    """CLOCK_REALTIME."""
+    until_ns: int = 0
+    """0: the bag ends with it."""
+    records: int = 0
+    """Trace records that are not in the bag; messages are in the ledger."""
+
+
 class MessageSource(Protocol):
     """Messages kept elsewhere until the recorder takes them."""
 
@@ -149,7 +167,7 @@ class TraceBag:
         self._split = split or Split()
         self._node_name = node_name.rstrip("/")
         self._on_error = on_error
-        self._bag = BagWriter(directory, disk=disk)
+        self._bag = BagWriter(directory, disk=disk, keeps_room=True)
         try:
             self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
             self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
@@ -162,6 +180,11 @@ class TraceBag:
         self._latched: dict[str, bytes] = {}  # each file begins with these
         self._latched_of_others: dict[str, deque[SentMessage]] = {}
         self._repeated: Counter[str] = Counter()
+        self._repeated_waiting: Counter[str] = Counter()  # for the next flush
+        self._records_waiting = 0
+        self._dropped_flushed = 0  # by the rings
+        self._interruptions: deque[Interruption] = deque(maxlen=_MOST_INTERRUPTIONS)
+        self._is_interrupted = False
         self._last: Drain | None = None
         self._ahead_ns: int | None = None  # log time - monotonic time
         self._refused_types: set[tuple[str, str]] = set()
@@ -182,6 +205,7 @@ class TraceBag:
         A batch without records (it tells of losses) is written if `whole`.
         """
         self._last = drain
+        self._records_waiting += len(drain.records) // _RECORD_BYTES
         self._write_names(drain)
         if drain.records or messages or whole:
             self._write_batch(drain, drain.records)
@@ -190,6 +214,7 @@ class TraceBag:
     def discard(self, drain: Drain) -> None:
         """Leave out what was recorded before this bag; only how much it was gets into it."""
         self._last = drain
+        self._dropped_flushed = sum(drain.dropped)
         self._write_names(drain)
         self._write_batch(drain, b"")
 
@@ -212,20 +237,109 @@ class TraceBag:
     def flush(self) -> None:
         """Make the bag a finished one of all that was written; go on in a new file when it is time."""
         self._bag.flush()
+        self._note_flushed()
         last = self._last
         if last is not None and self._is_time_to_split(self._log_time_ns(last, last.monotonic_ns)):
             self._bag.split()
-            for topic, data in self._latched.items():
-                self._write(self._topic(topic), data, last, last.monotonic_ns)
-            self._write_batch(last, b"")
-            for topic, kept in self._latched_of_others.items():
-                for message in kept:
-                    self._write(topic, message.data, last, last.monotonic_ns)
-                self._repeated[topic] += len(kept)
+            self._begin_file(last)
+
+    def finish(self) -> None:
+        """Flush a last time. Then abort() closes the bag."""
+        self._bag.finish()
+        self._note_flushed()
 
     def close(self) -> None:
-        """Flush a last time."""
-        self._bag.close()
+        """Flush a last time, and close."""
+        try:
+            self.finish()
+        finally:
+            self.abort()
+
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether nothing can be written since interrupt()."""
+        return self._is_interrupted
+
+    def interrupt(self, reason: str) -> Counter[str]:
+        """Give up what no flush could write; returns the messages, by topic. Write nothing until go_on()."""
+        own = {self._topic(name) for name in (NAMES, BATCHES, ARCHITECTURE)}
+        waiting = self._bag.drop_waiting()
+        lost = Counter({topic: count for topic, count in waiting.items() if topic not in own})
+        lost -= self._repeated_waiting
+        self._repeated -= self._repeated_waiting
+        self._repeated_waiting.clear()
+        now_ns = self._last.realtime_ns if self._last is not None else time.time_ns()
+        self._interruptions.append(Interruption(reason[:_LONGEST_REASON], now_ns))
+        self._is_interrupted = True
+        self._lose_records(self._records_waiting)
+        return lost
+
+    def skip(self, drain: Drain) -> None:
+        """Count what was drained while the bag is interrupted."""
+        self._last = drain
+        self._lose_records(len(drain.records) // _RECORD_BYTES)
+
+    def write_last_words(self) -> None:
+        """Write ledger, drop counts and interruptions into the room that the bag keeps for them.
+
+        Raises:
+            TraceError: they do not fit, or the disk failed.
+
+        """
+        self._tell_interruptions()
+        self._bag.write_into_room()
+
+    def go_on(self) -> Interruption:
+        """Go on in a new file; returns what it missed.
+
+        Raises:
+            TraceError: there is no room yet; the bag is as before.
+
+        """
+        last, ongoing = self._last, self._interruptions[-1]
+        if last is None:
+            msg = "nothing was drained yet"
+            raise TraceError(msg)
+        ended = ongoing._replace(until_ns=last.realtime_ns)
+        self._interruptions[-1] = ended
+        self._tell_interruptions()
+        try:
+            self._bag.go_on(functools.partial(self._begin_file, last))
+        except TraceError:
+            self._interruptions[-1] = ongoing
+            self._repeated -= self._repeated_waiting
+            self._repeated_waiting.clear()
+            raise
+        self._note_flushed()
+        self._is_interrupted = False
+        return ended
+
+    def _begin_file(self, last: Drain) -> None:
+        for topic, data in self._latched.items():
+            self._write(self._topic(topic), data, last, last.monotonic_ns)
+        self._write_batch(last, b"")
+        for topic, kept in self._latched_of_others.items():
+            for message in kept:
+                self._write(topic, message.data, last, last.monotonic_ns)
+            self._repeated[topic] += len(kept)
+            self._repeated_waiting[topic] += len(kept)
+
+    def _note_flushed(self) -> None:
+        self._repeated_waiting.clear()
+        self._records_waiting = 0
+        self._dropped_flushed = sum(self._last.dropped) if self._last is not None else 0
+
+    def _lose_records(self, count: int) -> None:
+        dropped = sum(self._last.dropped) if self._last is not None else 0
+        count += max(dropped - self._dropped_flushed, 0)  # by the rings
+        self._dropped_flushed = dropped
+        self._records_waiting = 0
+        ongoing = self._interruptions[-1]
+        self._interruptions[-1] = ongoing._replace(records=ongoing.records + count)
+
+    def _tell_interruptions(self) -> None:
+        told = json.dumps([one._asdict() for one in self._interruptions])
+        self._bag.set_custom_data(INTERRUPTIONS, told)
 
     def abort(self) -> None:
         """Leave the bag as the last flush left it."""

@@ -27,6 +27,7 @@ ADDED = f"{HOWTO_ROS}a_component_is_removed_and_added_as_the_page_says"
 GIVEN_UP = f"{HOWTO_ROS}a_hung_component_is_given_up_as_the_page_says"
 PEERS = f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same"
 UNIT_FILES = f"{HOWTO}systemd_knows_each_line_of_the_units"
+SNAPSHOT = "python/trace/test_snapshot.py::test_every_reader_reads_a_snapshot_of_a_bag_that_is_being_written"
 WAKEUP = f"{HOWTO}the_wakeup_latency_is_measured_and_used_as_the_page_says"
 PINNED = f"{HOWTO}the_settings_of_pinned_components_are_accepted"
 
@@ -150,6 +151,7 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "mauve trace info DIR": (
             "python/cli/test_trace.py::test_info",
             "python/cli/test_trace.py::test_check_and_repair",
+            SNAPSHOT,
             "python/cli/test_trace.py::test_stats",
             "python/cli/test_trace_export.py::test_perfetto_is_the_default",
         ),

@@ -1,22 +1,35 @@
 """The keeper writes a bag's files: a kill of the recording process finds each write done, or not begun."""
 
 import errno
+import json
 import os
+import resource
 import shutil
 import signal
+import subprocess
+import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bag_kills import KEEPER, TEXT, has_ended, kill_in_a_write, until
 from bag_rules import assert_rosbag2_reads
 from mcap.reader import make_reader
+from preloaded import DiskCalls
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag.disk import Disk, KeptDisk
+from mauve_rt.trace.bag.recorded import SentMessage
+from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.format.records import Kind
+from mauve_rt.trace.reading.check import check_bag
+from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER
 
 
 @pytest.fixture(autouse=True)
@@ -153,7 +166,7 @@ def test_where_it_cannot_be_started_the_process_writes_itself_and_says_so(tmp_pa
 
 def test_it_takes_nothing_of_its_process(kept: Kept, file: int):
     """No pipe of it stays open, and no folder in use."""
-    kept.disk.write(file, (b"it has begun",), 0)
+    kept.disk.write(file, (b"it has begun",), 0, sync=True)
     held = {path.readlink() for path in Path(f"/proc/{kept.process}/fd").iterdir()}
     assert {str(path).partition(":")[0] for path in held} == {"/dev/null", "socket", "/memfd"}
     assert Path(f"/proc/{kept.process}/cwd").readlink() == Path("/")
@@ -168,14 +181,301 @@ def test_a_disk_that_stands_still_holds_up_no_recorder(tmp_path: Path):
     try:
         until(lambda: not record(recorder), "the queue to be full")
         assert recorder.dropped_messages > 0
-        recorder.stop()
-        assert recorder.recording, "it waits for the disk still"
+        assert not recorder.stop()
+        assert not recorder.is_closed, "it waits for the disk still"
     finally:
         os.kill(process, signal.SIGCONT)
-    until(lambda: not recorder.recording, "its end")
+    until(lambda: recorder.is_closed, "its end")
     until(lambda: has_ended(process), "the keeper's end")
     with Reader(tmp_path / "bag") as reader:
         assert reader.message_count == recorder.message_count
+
+
+# ---- a power loss: what is on the disk, not only in memory
+
+
+@pytest.fixture
+def calls(tmp_path: Path) -> DiskCalls:
+    return DiskCalls(KEEPER, tmp_path)
+
+
+def recorded(tmp_path: Path, calls: DiskCalls, **options: Any) -> Recorder:
+    source = SyntheticSource(["c"])
+    return Recorder(source, tmp_path / "bag", node_name="/executor", keeper=calls.keeper, **options)
+
+
+def test_what_is_written_is_on_the_disk_each_second(tmp_path: Path, calls: DiskCalls):
+    recorder = recorded(tmp_path, calls, flush_period_s=0.05)
+    created = [*calls.seen()]
+    assert "fdatasync bag_0.mcap" in created or "fdatasync .bag_0.mcap.new" in created
+    recorder.start()
+    synced = time.monotonic()
+    for count in range(1, 4):
+        until(lambda: calls.seen()[len(created) :].count("fdatasync bag_0.mcap") >= count, "a sync")  # noqa: B023
+    assert time.monotonic() - synced > 2, "not at each flush"
+    recorder.stop()
+    seen = [call for call in calls.seen()[len(created) :] if call.startswith(("fdatasync", "fsync"))]
+    in_a_flush = ["fdatasync bag_0.mcap", "fdatasync .metadata.yaml.new", "fsync bag"]
+    between = ["fdatasync bag_0.mcap", "fdatasync metadata.yaml", "fsync bag"]
+    syncs = [seen[place : place + 3] for place in range(0, len(seen), 3)]
+    assert all(sync in (in_a_flush, between) for sync in syncs), "the file is on the disk first"
+    assert calls.seen().count("renameat bag") > 3 * len(syncs)
+
+
+def test_what_is_written_last_is_on_the_disk_a_second_later(tmp_path: Path, calls: DiskCalls):
+    file = os.open(tmp_path / "file", os.O_RDWR | os.O_CREAT)
+    kept = Kept(calls.keeper)
+    kept.disk.write(file, (b"data",), 0)
+    assert calls.seen() == ["pwrite file"]
+    until(lambda: calls.seen() == ["pwrite file", "fdatasync file"], "a sync without another write")
+    kept.disk.write(file, (b"data",), 0)
+    kept.disk.close()
+    until(lambda: calls.seen()[2:] == ["pwrite file", "fdatasync file"], "a sync at the end")
+    os.close(file)
+
+
+def test_a_split_and_an_end_are_on_the_disk(tmp_path: Path, calls: DiskCalls):
+    bag = BagWriter(tmp_path / "bag", disk=Kept(calls.keeper).disk)
+    bag.add_topic("/words", TEXT)
+    for name, end in (("bag_0.mcap", bag.split), ("bag_1.mcap", bag.close)):
+        bag.write("/words", 1, bytes([0, 1, 0, 0, 2, 0, 0, 0, 48, 0]))
+        before = len(calls.seen())
+        end()
+        seen = calls.seen()[before:]
+        assert seen[: seen.index("fsync bag") + 1] == [
+            f"pwrite {name}",
+            f"fdatasync {name}",
+            "pwrite .metadata.yaml.new",
+            "fdatasync .metadata.yaml.new",
+            "renameat bag",
+            "fsync bag",
+        ]
+
+
+def test_a_disk_that_cannot_sync_ends_the_recording(tmp_path: Path, calls: DiskCalls):
+    errors: list[str] = []
+    recorder = recorded(tmp_path, calls, on_error=errors.append)
+    recorder.start()
+    until(lambda: recorder.message_count > 0, "a flush")
+    calls.fail("fdatasync", errno.EIO)
+    until(lambda: not recorder.recording, "its end")
+    assert recorder.stop()
+    assert "Input/output error" in errors[0]
+
+
+# ---- a disk that refuses to write: what was lost is in the bag
+
+
+@pytest.fixture
+def small_disk(tmp_path: Path) -> Iterator[Path]:
+    """A file system of 400 kB."""
+    place = tmp_path / "small"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=400k", "none", str(place)]
+    if subprocess.run(mount, check=False, capture_output=True, timeout=60).returncode != 0:
+        pytest.skip("no rights to mount a small file system")
+    yield place
+    subprocess.run(["umount", "-l", str(place)], check=True, timeout=60)
+
+
+def text_of(size: int) -> bytes:
+    return bytes([0, 1, 0, 0]) + size.to_bytes(4, "little") + b"x" * (size - 1) + bytes(1)
+
+
+class Fed:
+    """A recorder that a test gives records and messages, and what became of them by its own count."""
+
+    def __init__(self, directory: Path, keeper: Path | None, *, waits: bool) -> None:
+        self.errors: list[str] = []
+        self.source = SyntheticSource(["c"])
+        self.recorder = Recorder(
+            self.source,
+            directory,
+            node_name="/executor",
+            keeper=keeper,
+            flush_period_s=0.02,
+            on_error=self.errors.append,
+            waits_for_room=waits,
+        )
+        self.messages = 0
+        self.recorder.start()
+
+    @property
+    def records(self) -> int:
+        """What the recorder has taken."""
+        return self.source._written[0] - len(self.source._waiting)
+
+    def feed(self) -> None:
+        """One record, one message of 3 kB."""
+        now = self.source._written[0]
+        self.source.add("c", Kind.MARK, now)
+        if self.recorder.record("/words", TEXT, text_of(3000), monotonic_ns=now):
+            self.messages += 1
+        time.sleep(0.01)
+
+    def is_refused(self) -> bool:
+        """Whether the disk refused to write, after more was fed."""
+        self.feed()
+        return bool(self.errors)
+
+    def assert_told(self, reason: str, *, count: int = 1) -> None:
+        """The bag tells how much of what was fed is not in it, and why."""
+        bag = self.recorder.directory
+        state = examine_bag(bag)
+        assert state.damages() == []
+        assert_rosbag2_reads(bag)
+        trace = open_trace(bag)
+        recorded = sum(1 for _ in trace.messages("/words"))
+        ledger = json.loads(state.custom_data[LEDGER])["/words"]
+        assert ledger["received"] >= self.messages
+        assert ledger["received"] - ledger["lost"] == recorded
+        assert int(state.custom_data[DROPPED_MESSAGES]) == ledger["lost"] > 0
+        told = json.loads(state.custom_data[INTERRUPTIONS])
+        assert len(told) == count
+        assert all(reason in one["reason"] for one in told)
+        assert sum(one["records"] for one in told) == self.records - len(trace.of("c"))
+        losses = [finding.text for finding in check_bag(bag) if finding.is_loss]
+        assert any(reason in text for text in losses)
+
+
+@pytest.mark.parametrize("keeper", [None, KEEPER], ids=["direct", "kept"])
+def test_a_full_disk_leaves_its_losses_in_the_bag(small_disk: Path, keeper: Path | None):
+    fed = Fed(small_disk / "bag", keeper, waits=False)
+    until(fed.is_refused, "the disk to be full")
+    until(lambda: not fed.recorder.recording, "the end")
+    fed.recorder.stop()
+    assert len(fed.errors) == 1
+    assert "recording stopped" in fed.errors[0]
+    fed.assert_told("No space left on device")
+    (one,) = json.loads(examine_bag(small_disk / "bag").custom_data[INTERRUPTIONS])
+    assert one["until_ns"] == 0
+    held = {path.name for path in (small_disk / "bag").iterdir()}
+    assert held == {"bag_0.mcap", "metadata.yaml"}
+
+
+def test_a_limit_of_file_size_leaves_its_losses_in_the_bag(tmp_path: Path):
+    fed = Fed(tmp_path / "bag", KEEPER, waits=False)
+    until(lambda: fed.recorder.message_count > 3, "flushes")
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.prlimit(keeper_of(fed.recorder), resource.RLIMIT_FSIZE, (200_000, hard))
+    until(fed.is_refused, "the limit")
+    until(lambda: not fed.recorder.recording, "the end")
+    fed.recorder.stop()
+    fed.assert_told("File too large")
+
+
+def test_a_recording_goes_on_when_the_disk_has_room_again(small_disk: Path):
+    (small_disk / "in_the_way").write_bytes(bytes(250_000))
+    fed = Fed(small_disk / "bag", KEEPER, waits=True)
+    until(fed.is_refused, "the disk to be full")
+    assert "recording paused until the disk has room again" in fed.recorder.error
+    assert fed.recorder.recording
+    for _ in range(20):
+        fed.feed()
+    at_the_pause = [file.name for file in (small_disk / "bag").glob("*.mcap")]
+    assert at_the_pause == ["bag_0.mcap"]
+    (small_disk / "in_the_way").unlink()
+    until(lambda: not fed.recorder.error, "the recording to go on")
+    assert "recording goes on after" in fed.errors[-1]
+    fed.feed()
+    assert fed.recorder.stop()
+    fed.assert_told("No space left on device")
+    (one,) = json.loads(examine_bag(small_disk / "bag").custom_data[INTERRUPTIONS])
+    assert one["until_ns"] > one["from_ns"]
+    assert sorted(file.name for file in (small_disk / "bag").glob("*.mcap")) == ["bag_0.mcap", "bag_1.mcap"]
+    assert open_trace(small_disk / "bag").of("c")["time_ns"][-1] == fed.records - 1
+
+
+def test_a_recording_that_is_stopped_while_it_is_paused_leaves_its_losses(small_disk: Path):
+    fed = Fed(small_disk / "bag", KEEPER, waits=True)
+    until(fed.is_refused, "the disk to be full")
+    for _ in range(20):
+        fed.feed()
+    assert fed.recorder.stop()
+    fed.assert_told("No space left on device")
+
+
+def test_a_write_error_that_ends_is_a_pause(tmp_path: Path, calls: DiskCalls):
+    fed = Fed(tmp_path / "bag", calls.keeper, waits=True)
+    until(lambda: fed.recorder.message_count > 3, "flushes")
+    for _ in range(2):
+        calls.fail("pwrite", errno.EIO)
+        until(fed.is_refused, "the error")
+        calls.succeed()
+        until(lambda: not fed.recorder.error, "the recording to go on")
+        fed.errors.clear()
+        fed.feed()
+        until(lambda before=fed.recorder.message_count: fed.recorder.message_count > before, "a flush")
+    assert fed.recorder.stop()
+    fed.assert_told("Input/output error", count=2)
+
+
+def keeper_of(recorder: Recorder) -> int:
+    return recorder._bag._bag._disk._process
+
+
+class TappedSource(SyntheticSource):
+    """A source that counts who empties its rings, and a source of messages that serves one at a time."""
+
+    period_ns = 0
+    is_on = False
+    number = 0
+
+    def collect_trace(self, period_ns: int) -> None:
+        self.period_ns = period_ns
+
+    def keep_messages(self, *, on: bool) -> None:
+        self.is_on = on
+
+    def take_messages(self) -> list[SentMessage]:
+        if not self.is_on:
+            return []
+        self.number += 1
+        text = f"{self.number}".encode()
+        data = bytes([0, 1, 0, 0, len(text) + 1, 0, 0, 0]) + text + bytes(1)
+        return [SentMessage("/numbers", TEXT, data, self.number, None)]
+
+    def dropped_messages(self) -> int:
+        return 0
+
+
+def test_a_hanging_disk_harms_no_later_recording(tmp_path: Path):
+    source = TappedSource(["c"])
+
+    def begun(name: str) -> Recorder:
+        made = Recorder(source, tmp_path / name, node_name="/executor", keeper=KEEPER, messages=source)
+        made.start()
+        return made
+
+    slow = begun("slow")
+    keeper = slow._bag._bag._disk._process
+    until(lambda: slow.message_count > 0, "a flush")
+    os.kill(keeper, signal.SIGSTOP)
+    try:
+        source.add("c", Kind.MARK, 1)
+        assert not slow.stop()
+        assert (source.period_ns, source.is_on) == (0, False), "the tap is released, the disk hangs yet"
+        last = source.number
+        next_one = begun("next")
+        source.add("c", Kind.MARK, 2)
+    finally:
+        os.kill(keeper, signal.SIGCONT)
+    until(lambda: slow.is_closed, "the end of the slow one")
+    assert source.period_ns > 0
+    assert source.is_on
+    source.add("c", Kind.MARK, 3)
+    taken = source.number
+    until(lambda: source.number > taken, "messages for the next one")
+    assert next_one.stop()
+    times = {}
+    for name in ("slow", "next"):
+        assert check_bag(tmp_path / name)[-1].kind == "note", "no architecture"
+        trace = open_trace(tmp_path / name)
+        times[name] = [int(row["time_ns"]) for row in trace.of("c")]
+        numbers = [int(message.msg.data) for message in trace.messages("/numbers")]
+        expected = range(1, last + 1) if name == "slow" else range(last + 1, source.number + 1)
+        assert numbers == list(expected)
+    assert times == {"slow": [1], "next": [2, 3]}
 
 
 def record(recorder: Recorder) -> bool:
@@ -198,6 +498,7 @@ def test_a_kill_in_a_write_leaves_whole_files(tmp_path: Path, size: int, split_e
                 by_mcap = sum(1 for _ in make_reader(stream, validate_crcs=True).iter_messages())
             with Reader(file) as reader:
                 assert sum(1 for _ in reader.messages()) == by_mcap
+        assert examine_bag(bag).damages() == [], "metadata.yaml is neither newer nor older"
         assert_rosbag2_reads(bag, was_killed=True)
         with Reader(bag) as reader:
             assert sum(1 for _ in reader.messages()) > trial, "what was flushed before is there"

@@ -10,6 +10,7 @@ import shutil
 import signal
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import pytest
 from bag_kills import KEEPER, TEXT, has_ended, until
@@ -38,9 +39,7 @@ class WorldDisk(Disk):
         self._is_torn = dice.random() < 0.5
         self._killed_at = dice.randrange(1, 40) if dice.random() < 0.5 else 0
 
-    def write(
-        self, descriptor: int, parts: Sequence[bytes | bytearray], offset: int, *, size: int | None = None
-    ) -> None:
+    def write(self, descriptor: int, parts: Sequence[bytes | bytearray], offset: int, **options: Any) -> None:
         self._writes += 1
         if self._writes == self._killed_at and (process := self.kept._process):
             os.kill(process, signal.SIGKILL)
@@ -50,7 +49,7 @@ class WorldDisk(Disk):
                 data = b"".join(parts)
                 os.pwrite(descriptor, data[: len(data) // 2], offset)
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        self.kept.write(descriptor, parts, offset, size=size)
+        self.kept.write(descriptor, parts, offset, **options)
 
     def close(self) -> None:
         self.kept.close()

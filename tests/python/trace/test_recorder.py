@@ -152,7 +152,8 @@ def test_a_full_disk_ends_the_recording_and_says_so_once(
     source.cycle("control", 1000, states={}, wait_ns=20)
     wait_until(lambda: records_in(recorder.directory, "control") == 2)
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (8192, hard))
+    [file] = recorder.directory.glob("*.mcap")
+    resource.setrlimit(resource.RLIMIT_FSIZE, (file.stat().st_size + 4096, hard))
     try:
         for number in range(300):
             source.cycle("control", 2000 + 20 * number, states={}, wait_ns=20)

@@ -1,15 +1,19 @@
 """Bags begun and ended while the executor runs, by service; and what is refused."""
 
 import json
+import os
 import resource
+import signal
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import pytest
+from bag_kills import has_ended
 from bag_rules import assert_rosbag2_reads
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mcap.reader import make_reader
+from preloaded import shared_library
 from ros_processes import ExecutorProcess
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Float64
@@ -205,9 +209,131 @@ def test_a_full_disk_ends_the_recording_with_a_diagnostic(
     reply = stop(graph)
     assert reply.success
     assert "it had ended by itself: recording stopped" in reply.message
+    (told,) = [finding for finding in check_bag(tmp_path / "bag") if "ended by itself" in finding.text]
+    assert told.is_loss
+    assert "File too large" in told.text
     assert examine_bag(tmp_path / "bag").is_finished
     assert_rosbag2_reads(tmp_path / "bag")
     assert len(mauve_rt.trace.open(tmp_path / "bag").of("counter")) > 0
+
+
+def test_a_recording_pauses_where_the_setting_says_so(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    arguments = ("-p", f"architecture:={architecture}", "-p", f"bags:={tmp_path}")
+    executor = start_executor(*arguments, "-p", "bag_waits_for_room:=true")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    assert start(graph, bag="bag").success
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    graph.spin_until(lambda: file.stat().st_size > ROOM, "records on the disk")
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    (keeper,) = children_of(executor)
+    resource.prlimit(keeper, resource.RLIMIT_FSIZE, (file.stat().st_size + MORE, hard))
+    told = "recording paused until the disk has room again"
+    graph.spin_until(lambda: told in executor.output, "the pause")
+    graph.spin_until(lambda: "recording goes on after" in executor.output, "the recording to go on")
+    reply = stop(graph)
+    assert reply.success, reply.message
+    assert "dropped" in reply.message
+    findings = check_bag(tmp_path / "bag")
+    assert any("the recording paused for" in finding.text and finding.is_loss for finding in findings)
+    assert not [finding for finding in findings if finding.is_damage]
+    assert_rosbag2_reads(tmp_path / "bag")
+
+
+def numbers_of(bag: Path) -> list[float]:
+    return [message.msg.data for message in mauve_rt.trace.open(bag).messages("/robot_1/count")]
+
+
+def test_a_disk_that_hangs_at_a_stop_harms_no_later_recording(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+):
+    assert start(graph, bag="slow").success
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 5, "counts for the first bag")
+    (keeper,) = children_of(executor)
+    os.kill(keeper, signal.SIGSTOP)
+    try:
+        reply = stop(graph)
+        assert (reply.success, reply.code) == (False, ReplyCode.TIMEOUT)
+        assert f"{tmp_path / 'slow'} is not complete" in reply.message
+        assert reply.bag == str(tmp_path / "slow")
+        assert start(graph, bag="next").success
+        counts = graph.hear(Float64, "/robot_1/count")
+        graph.spin_until(lambda: len(counts) > 5, "counts while the first disk hangs")
+    finally:
+        os.kill(keeper, signal.SIGCONT)
+    graph.spin_until(lambda: keeper not in children_of(executor) or has_ended(keeper), "the first bag's end")
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 5, "counts after the first bag's end")
+    assert stop(graph).success
+    for name in ("slow", "next"):
+        assert check_bag(tmp_path / name) == []
+    assert numbers_of(tmp_path / "next")[-1] >= counts[-1].data
+    numbers = numbers_of(tmp_path / "next")
+    assert len(numbers) == abs(numbers[-1] - numbers[0]) + 1, "none is missing in between"
+
+
+HANGING_MKDIR = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+int mkdir(const char* path, mode_t mode) {
+  int (*next)(const char*, mode_t) = (int (*)(const char*, mode_t))dlsym(RTLD_NEXT, "mkdir");
+  if (strstr(path, "hanging") != NULL) {
+    int (*begun)(const char*, mode_t) = next;
+    begun(getenv("MKDIR_HANGS"), 0777);
+    while (access(getenv("MKDIR_GOES_ON"), F_OK) != 0) usleep(10000);
+  }
+  return next(path, mode);
+}
+"""
+
+
+def test_no_request_waits_for_a_disk_on_which_a_bag_is_made(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    hangs, goes_on = tmp_path / "hangs", tmp_path / "goes_on"
+    preloaded = shared_library(tmp_path / "mkdir.c", HANGING_MKDIR)
+    environment = {"LD_PRELOAD": preloaded, "MKDIR_HANGS": str(hangs), "MKDIR_GOES_ON": str(goes_on)}
+    executor = start_executor(
+        "-p", f"architecture:={architecture}", "-p", f"bags:={tmp_path}", environment=environment
+    )
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    client = graph.node.create_client(StartRecording, f"{EXECUTOR}/start_recording")
+    graph.spin_until(client.service_is_ready, "the service")
+    for bag in ("hanging_1", "hanging_2"):
+        is_called_off = bag == "hanging_2"
+        answer = client.call_async(StartRecording.Request(bag=bag))
+        graph.spin_until(hangs.exists, "the disk to hang")
+        core = "executor_tests/Counter" if is_called_off else "executor_tests/Backwards"
+        reply = graph.ask(ReplaceCore, f"{EXECUTOR}/replace_core", component="counter", core=core)
+        assert reply.success, reply.message
+        again = start(graph, bag="other")
+        assert (again.success, again.code) == (False, ReplyCode.ALREADY_RUNNING)
+        assert "its disk has not answered yet" in again.message
+        if is_called_off:
+            assert stop(graph).code == ReplyCode.NOT_RUNNING
+        assert not answer.done()
+        goes_on.touch()
+        graph.spin_until(answer.done, "the answer of the disk")
+        if is_called_off:
+            assert answer.result().code == ReplyCode.PREPARE_FAILED
+            assert "a stop called its recording off" in answer.result().message
+            assert stop(graph).code == ReplyCode.NOT_RUNNING
+        else:
+            assert answer.result().success, answer.result().message
+            assert stop(graph).success
+        hangs.rmdir()
+        goes_on.unlink()
+        assert examine_bag(tmp_path / bag).is_finished
+    assert "Traceback" not in executor.output
 
 
 def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tmp_path: Path):
