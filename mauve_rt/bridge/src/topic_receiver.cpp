@@ -19,7 +19,7 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kMessagesAtOnce = 5000;      // of one topic before the others have their turn
+constexpr int kMessagesATurn = 5000;       // of one topic before the others have their turn
 constexpr std::size_t kMostWriters = 256;  // of one topic: more have come and gone
 // Between two waits: at 20 kHz a wait for each message costs more than the messages. The middleware notes when each came.
 constexpr time_ns_t kPause = ms_to_ns(5);
@@ -116,7 +116,7 @@ void ReceivedTopic::join(rcl_wait_set_t& set) {
 }
 
 void ReceivedTopic::take() {
-  for (int taken = 0; taken < kMessagesAtOnce; ++taken) {
+  for (int taken = 0; taken < kMessagesATurn; ++taken) {
     const time_ns_t now_ns = monotonic_now_ns();
     rmw_message_info_t about = rmw_get_zero_initialized_message_info();
     if (!went_well(rcl_take_serialized_message(subscription_.get(), message_.get(), &about, nullptr))) {

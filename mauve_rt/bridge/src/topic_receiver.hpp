@@ -85,8 +85,6 @@ class ReceivedTopic final : public Arrival {
   int take_misfit();
 
  private:
-  using Open = rcl_ret_t (*)(rcl_event_t*, const rcl_subscription_t*, rcl_subscription_event_type_t);
-
   void follow(const rmw_message_info_t& about);
   time_ns_t arrival_ns(const rmw_message_info_t& about, time_ns_t now_ns) const;
 

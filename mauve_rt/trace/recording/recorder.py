@@ -7,13 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
-from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage, Split, TopicQos
 from mauve_rt.trace.recording.trace_bag import (
     BATCHES,
     DROPPED_MESSAGES,
     NAMES,
     Drain,
+    Entry,
     MessageSource,
+    TopicSource,
     TraceBag,
     TraceSource,
 )
@@ -25,6 +27,7 @@ __all__ = [
     "Drain",
     "MessageSource",
     "Recorder",
+    "TopicSource",
     "TraceSource",
 ]
 
@@ -63,6 +66,7 @@ class Recorder:
         split: Split | None = None,
         on_error: Callable[[str], None] | None = None,
         messages: MessageSource | None = None,
+        topics: TopicSource | None = None,
         keeper: Path | None = None,
     ) -> None:
         """Create the bag; nothing is drained before start().
@@ -77,6 +81,7 @@ class Recorder:
             split: when the bag goes on in a new file; after a minute unless said otherwise.
             on_error: called at most once for each cause, with one line, on the recorder thread.
             messages: asked, on the recorder thread, for messages beside those given to record().
+            topics: of other nodes; it is stopped when the recording ends by itself.
             keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
 
@@ -90,6 +95,9 @@ class Recorder:
         self._queue_bytes = queue_bytes
         self._on_error = on_error
         self._messages = messages
+        self._topics = topics
+        self._others: dict[str, Entry] = {}
+        self._refused: Counter[str] = Counter()  # of topics of other nodes
         self._dropped_before = messages.dropped_messages() if messages is not None else 0
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
@@ -132,8 +140,14 @@ class Recorder:
     def dropped_messages(self) -> int:
         """Messages that were to be recorded and did not get into the bag."""
         elsewhere = self._messages.dropped_messages() if self._messages is not None else 0
+        others = sum(entry.lost for entry in self._others.values())
         with self._lock:
-            return self._lost.total() + elsewhere - self._dropped_before
+            return self._lost.total() + others + elsewhere - self._dropped_before
+
+    @property
+    def others(self) -> dict[str, Entry]:
+        """What became of the messages of each topic of other nodes, as of the last flush."""
+        return self._others
 
     def start(self, *, discard: bool = False) -> None:
         """Start the thread. Once only.
@@ -181,12 +195,6 @@ class Recorder:
             self._waiting_bytes += len(data)
             return True
 
-    def lose(self, topic: str, count: int) -> None:
-        """Messages of a topic were sent, and lost before they came here. From any thread."""
-        with self._lock:
-            self._received[topic] += count
-            self._lost[topic] += count
-
     def stop(self) -> None:
         """Drain and flush a last time, close the bag. Returns within 2 s; may be called again."""
         self._stop.set()
@@ -216,6 +224,8 @@ class Recorder:
             self._source.collect_trace(0)
             if self._messages is not None:
                 self._messages.keep_messages(on=False)
+            if self._topics is not None:
+                self._topics.stop()
 
     def _write(self) -> None:
         with self._lock:  # before the drain: then no message is later than the clock pair that maps it
@@ -228,15 +238,30 @@ class Recorder:
         taken = self._messages.take_messages() if self._messages is not None else ()
         more = Counter(message.topic for message in taken)
         waiting += taken
+        batch = self._topics.take() if self._topics is not None else None
         drain = self._source.drain_trace()
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)
+        if self._topics is not None and batch is not None:
+            self._refused += self._bag.write_received(batch, self._topics.topics, drain)
+            self._others = self._entries(self._topics, batch)
         with self._lock:
             self._received += more
             self._lost += refused
-        self._bag.tell_ledger(received + more, lost + refused)
+        self._bag.tell_ledger(received + more, lost + refused, self._others)
         self._bag.tell_dropped(self.dropped_messages)
+
+    def _entries(self, source: TopicSource, batch: ReceivedBatch) -> dict[str, Entry]:
+        return {
+            topic.name: Entry(
+                received=received,
+                lost=lost + self._refused[topic.name],
+                lost_before=lost_before,
+                numbered=source.numbered,
+            )
+            for topic, (received, lost_before, lost) in zip(source.topics, batch.counts, strict=True)
+        }
 
     def _report(self, text: str) -> None:
         if self._on_error is not None:
