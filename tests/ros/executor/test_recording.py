@@ -2,6 +2,8 @@
 
 import json
 import resource
+import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,8 +13,9 @@ from bag_rules import assert_rosbag2_reads
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mcap.reader import make_reader
 from ros_processes import ExecutorProcess
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rosbags.highlevel import AnyReader
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, UInt8MultiArray, UInt64
 
 import mauve_rt.trace
 from mauve_msgs.msg import ReconfigurationStep, ReplyCode
@@ -21,7 +24,7 @@ from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import component_statistics
-from mauve_rt.trace.recording.trace_bag import LEDGER
+from mauve_rt.trace.recording.trace_bag import LEDGER, Entry
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
@@ -228,12 +231,74 @@ def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tm
     }
     assert heard["/robot_1/talk"] == [float(number) for number in range(20)]
     assert len(heard["/robot_1/count"]) == len({*heard["/robot_1/count"]}) > 10
-    assert check_bag(tmp_path / "bag") == []
+    (note,) = check_bag(tmp_path / "bag")
+    assert (note.kind, note.text.partition(":")[0]) == ("note", "/robot_1/talk"), "nothing of the executor"
+    assert "no gap between the first and the last message of each writer" in note.text
     ledger = json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])
-    assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0}
+    others = {"lost_before": 0, "numbered": True}
+    assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0, **others}
+    assert ledger["/robot_1/count"]["numbered"] is None
     with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
         (told,) = make_reader(stream).iter_metadata()
     assert json.loads(told.metadata[LEDGER]) == ledger, "the file by itself tells it, too"
+
+
+def numbers_of(bag: Path, topic: str) -> list[int]:
+    return [int(message.msg.data) for message in mauve_rt.trace.open(bag).messages(topic)]
+
+
+def test_a_burst_of_others_is_in_the_bag_or_counted(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+) -> None:
+    assert start(graph, bag="bag", topics=["/burst:std_msgs/msg/UInt64"]).success
+    voice = graph.voice(UInt64, "/burst", QoSProfile(depth=1000))
+    for number in range(3000):
+        voice.publish(UInt64(data=number))
+        time.sleep(0.001)
+    assert stop(graph).success
+    numbers = numbers_of(tmp_path / "bag", "/burst")
+    entry = Entry(**json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])["/burst"])
+    assert (entry.lost, entry.numbered) == (0, True)
+    assert entry.received == len(numbers)
+    assert entry.received + entry.lost_before == numbers[-1] - numbers[0] + 1
+    kinds = {finding.kind for finding in check_bag(tmp_path / "bag") if "/burst" in finding.text}
+    assert kinds == {"loss" if entry.lost_before else "note"}
+    assert_rosbag2_reads(tmp_path / "bag")
+
+
+def test_messages_lost_before_the_recorder_are_reported_everywhere(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+) -> None:
+    reply = start(graph, bag="bag", topics=["/burst:std_msgs/msg/UInt8MultiArray"])
+    assert reply.success, reply.message
+    told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
+    quality = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    voice = graph.voice(UInt8MultiArray, "/burst", quality)
+
+    def values(name: str) -> list[str]:
+        statuses = [one for array in told for one in array.status if one.name.endswith("recording")]
+        return [value.value for one in statuses for value in one.values if value.key == name]
+
+    def received() -> bool:
+        voice.publish(UInt8MultiArray(data=bytes(1000)))
+        return int((values("received[/burst]") or ["0"])[-1]) > 0
+
+    graph.spin_until(received, "a first message")
+    executor.process.send_signal(signal.SIGSTOP)
+    for _ in range(5000):  # more than the middleware keeps of a process that does not run
+        voice.publish(UInt8MultiArray(data=bytes(1000)))
+    executor.process.send_signal(signal.SIGCONT)
+
+    def lost() -> bool:
+        voice.publish(UInt8MultiArray(data=bytes(1000)))
+        return int(values("lost_before[/burst]")[-1]) > 0
+
+    graph.spin_until(lost, "the loss on /diagnostics")
+    words = "messages of other nodes lost before the recorder received them since the last status"
+    assert any(words in status.message for array in told for status in array.status)
+    assert "of other nodes were lost before they came here" in stop(graph).message
+    losses = [finding.text for finding in check_bag(tmp_path / "bag") if finding.is_loss]
+    assert any(text.startswith("topic /burst: ") and "lost before the recorder" in text for text in losses)
 
 
 def test_another_type_on_a_topic_to_record_is_told(executor: ExecutorProcess, graph: Any):
