@@ -44,6 +44,7 @@ class SqliteScan:
         self.library = "rosbag2 (sqlite3)"
         self.whole_bytes = 0
         self.damage = ""
+        self.custom_data: Mapping[str, str] = {}
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         try:

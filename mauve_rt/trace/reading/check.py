@@ -1,6 +1,5 @@
 """Whether a bag can be trusted: finished, whole, nothing missing that was recorded, no change split."""
 
-import json
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, LEDGER, Entry
+from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, Entry, ledger_of
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         return found
     trace = open_trace(path, progress=part(progress, 0.5, 1.0))
     found += [Finding(_words(name, loss), is_loss=True) for name, loss in trace.losses.items() if loss.lost]
-    ledger = _ledger(state)
+    ledger = ledger_of(state.custom_data)
     found += [Finding(text, is_loss=True) for text in _missing(state, ledger)]
     found += [Finding(text, is_loss=True) for text in _lost_before(ledger)]
     if dropped := _dropped_messages(state) - sum(entry.lost for entry in ledger.values()):
@@ -99,15 +98,6 @@ def _split_words(component: str, split: SplitChange) -> str:
 def _dropped_messages(state: BagState) -> int:
     text = state.custom_data.get(DROPPED_MESSAGES, "0")
     return int(text) if text.isdigit() else 0
-
-
-def _ledger(state: BagState) -> Mapping[str, Entry]:
-    """What metadata.yaml tells of each topic; nothing in a bag of an earlier version."""
-    try:
-        told = json.loads(state.custom_data.get(LEDGER, "{}"))
-        return {topic: Entry(**fields) for topic, fields in told.items()}
-    except (ValueError, TypeError, AttributeError):  # somebody else wrote it
-        return {}
 
 
 def _missing(state: BagState, ledger: Mapping[str, Entry]) -> Iterator[str]:

@@ -100,6 +100,26 @@ class Entry(NamedTuple):
         """What the bag has of it."""
         return self.received - self.lost + self.repeated
 
+    def plus(self, other: "Entry") -> "Entry":
+        """Return both together: of a topic that is recorded twice, in one bag or in several."""
+        known = {self.numbered, other.numbered} - {None}
+        return Entry(
+            self.received + other.received,
+            self.lost + other.lost,
+            self.repeated + other.repeated,
+            self.lost_before + other.lost_before,
+            all(known) if known else None,
+        )
+
+
+def ledger_of(custom_data: Mapping[str, str]) -> dict[str, Entry]:
+    """Return what the custom data of a bag tells of each topic; nothing in a bag of an earlier version."""
+    try:
+        told = json.loads(custom_data.get(LEDGER, "{}"))
+        return {topic: Entry(**fields) for topic, fields in told.items()}
+    except (ValueError, TypeError, AttributeError):  # somebody else wrote it
+        return {}
+
 
 class TopicSource(Protocol):
     """Topics of other nodes, received elsewhere."""
@@ -252,9 +272,8 @@ class TraceBag:
         """Note with the next flush what became of the messages of each topic."""
         told = {topic: Entry(count, lost.get(topic, 0)) for topic, count in received.items()}
         for topic, entry in (others or {}).items():
-            before = told.get(topic, Entry())  # a resource was bound to it while it was recorded
-            both = before.received + entry.received, before.lost + entry.lost
-            told[topic] = entry._replace(received=both[0], lost=both[1])
+            # Own as well: a resource was bound to it while it was recorded.
+            told[topic] = entry.plus(told.get(topic, Entry()))
         entries = {
             topic: entry._replace(repeated=self._repeated[topic])._asdict() for topic, entry in told.items()
         }

@@ -260,6 +260,7 @@ def test_check_tells_what_is_known_of_topics_of_other_nodes(tmp_path: Path, sour
     bag.write(source.drain_trace(), [], whole=True)
     bag.tell_ledger({"/own": 0}, {}, others)
     bag.close()
+    assert open_trace(tmp_path / "bag").ledger == {"/own": Entry(), **others}
     found = [(finding.kind, finding.text) for finding in check_bag(tmp_path / "bag")]
     losses = [text for kind, text in found if kind == "loss"]
     lost = "lost before the recorder received them, by"
