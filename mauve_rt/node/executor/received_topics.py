@@ -13,7 +13,7 @@ from mauve_rt.trace.bag.recorded import ReceivedTopic
 
 _DEPTH = 5000  # of a subscription: 5 s at 1 kHz, while the receiving thread has no CPU
 _OFFERED_DEPTH = 100  # by who plays the bag
-_QUEUE_BYTES = 64 * 1024 * 1024  # that may wait for a flush
+QUEUE_BYTES = 64 * 1024 * 1024  # that may wait for a flush
 
 
 class ChosenTopic(NamedTuple):
@@ -30,7 +30,7 @@ class ChosenTopic(NamedTuple):
 class ReceivedTopics:
     """The chosen topics, subscribed to from the construction until close(). From any thread.
 
-    A topic to which a resource is bound later is recorded by the bridge, and ignored here from the next flush on.
+    The bridge records a topic to which a resource is bound later: here it is ignored from the next flush on.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class ReceivedTopics:
 
         """
         self._bound = bound
-        self._receiver = TopicReceiver(node.handle.pointer, limit_bytes=_QUEUE_BYTES)
+        self._receiver = TopicReceiver(node.handle.pointer, limit_bytes=QUEUE_BYTES)
         self._chosen = tuple(chosen)
         self._ignored: set[str] = set()
         self.topics = tuple(
@@ -82,7 +82,7 @@ class ReceivedTopics:
         return batch
 
     def misfits(self) -> Iterator[tuple[ChosenTopic, str]]:
-        """Topics of which a publisher's quality of service did not fit since the last call, and in which policy."""
+        """Topics with a publisher that did not fit since the last call, and in which policy."""
         for topic, policy in zip(self._chosen, self._receiver.take_misfits(), strict=False):
             if policy:
                 yield topic, QoSPolicyKind(policy).name.lower()

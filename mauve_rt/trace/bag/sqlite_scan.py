@@ -5,7 +5,7 @@ rosbag2 makes them are read, of a file that sqlite3 itself finds whole.
 """
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Self

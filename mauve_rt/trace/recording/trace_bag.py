@@ -93,7 +93,7 @@ class Entry(NamedTuple):
     lost_before: int = 0
     """Of a topic of other nodes: messages that were sent and did not come, as far as that is known."""
     numbered: bool | None = None
-    """Of a topic of other nodes: whether the middleware numbers messages, so that gaps are known. Else null."""
+    """Of a topic of other nodes: whether its messages are numbered, so that gaps are known. Else null."""
 
     @property
     def recorded(self) -> int:
@@ -247,9 +247,7 @@ class TraceBag:
             else:
                 written[number] = topic.name
         log_ahead_ns = self._log_time_ns(drain, 0)
-        self._bag.write_batch(
-            batch, written, ahead_ns=(log_ahead_ns, drain.realtime_ns - drain.monotonic_ns)
-        )
+        self._bag.write_batch(batch, written, ahead_ns=(log_ahead_ns, drain.realtime_ns - drain.monotonic_ns))
         return refused
 
     def discard(self, drain: Drain) -> None:

@@ -102,7 +102,9 @@ def losses_section(analysis: Analysis) -> Section:
         for name, loss in analysis.trace.losses.items()
     ]
     html = table(("component", "records written", "in the bag", "lost"), rows)
-    if others := [_topic_row(*item) for item in analysis.trace.ledger.items() if item[1].numbered is not None]:
+    if others := [
+        _topic_row(*item) for item in analysis.trace.ledger.items() if item[1].numbered is not None
+    ]:
         html += table(("topic of other nodes", "received", "lost before the recorder", "lost by it"), others)
     files = [
         (file.path.name, file.library, f"{file.whole_bytes:,}", file.damage or "whole")

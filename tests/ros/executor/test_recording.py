@@ -12,8 +12,8 @@ import pytest
 from bag_rules import assert_rosbag2_reads
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mcap.reader import make_reader
-from ros_processes import ExecutorProcess
 from rclpy.qos import QoSProfile, ReliabilityPolicy
+from ros_processes import ExecutorProcess
 from rosbags.highlevel import AnyReader
 from std_msgs.msg import Float64, UInt8MultiArray, UInt64
 
