@@ -76,9 +76,8 @@ Typed<"list[tuple[int, bytes]]"> messages_of(const MessageBatch& self, std::size
 Typed<"tuple[bytes, list[tuple[int, int, int, bytes]]]"> pack(
     MessageBatch& self, const std::vector<std::uint16_t>& channels, time_ns_t log_ahead_ns,
     time_ns_t publish_ahead_ns, time_ns_t earliest_log_ns, std::uint64_t offset) {
-  const BagClock clock{.log_ahead_ns = log_ahead_ns,
-                       .publish_ahead_ns = publish_ahead_ns,
-                       .earliest_log_ns = earliest_log_ns};
+  const BagClock clock{
+      .log_ahead_ns = log_ahead_ns, .publish_ahead_ns = publish_ahead_ns, .earliest_log_ns = earliest_log_ns};
   py::list parts;
   for (const ChannelPart& part : self.pack(channels, clock, offset))
     parts.append(py::make_tuple(part.channel, part.first_ns, part.last_ns, python_bytes(part.index)));

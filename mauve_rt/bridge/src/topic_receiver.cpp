@@ -96,8 +96,9 @@ ReceivedTopic::ReceivedTopic(rcl_node_t& node, const std::string& name, const st
       caught_up_ns_(monotonic_now_ns()) {
   rcl_subscription_options_t options = rcl_subscription_get_default_options();
   options.qos = qos;
-  check(rcl_subscription_init(subscription_.get(), &node, &message_type_support(type), name.c_str(), &options),
-        "the topic cannot be subscribed to", "topic " + name);
+  check(
+      rcl_subscription_init(subscription_.get(), &node, &message_type_support(type), name.c_str(), &options),
+      "the topic cannot be subscribed to", "topic " + name);
   const auto has = [this](rcl_event_t& event, rcl_subscription_event_type_t kind) {
     return went_well(rcl_subscription_event_init(&event, subscription_.get(), kind));
   };
@@ -150,7 +151,7 @@ void ReceivedTopic::count_lost() {
 }
 
 int ReceivedTopic::take_misfit() {
-  rmw_qos_incompatible_event_status_t status{};
+  rmw_qos_incompatible_event_status_t status;  // filled by rcl
   if (!has_misfit_ || !take_event(misfit_, status) || status.total_count_change <= 0) return 0;
   return status.last_policy_kind;
 }
@@ -176,6 +177,7 @@ void TopicReceiver::start() {
   const LockGuard lock(mutex_);
   receiver_ = std::make_unique<Receiver>(node_, "recorded_in", kPause);
   std::vector<Arrival*> arrivals;
+  arrivals.reserve(topics_.size());
   for (const auto& topic : topics_) arrivals.push_back(topic.get());
   receiver_->start(std::move(arrivals));
 }
@@ -209,6 +211,7 @@ void TopicReceiver::ignore(std::size_t number, bool on) {
 std::vector<int> TopicReceiver::take_misfits() {
   const LockGuard lock(mutex_);
   std::vector<int> all;
+  all.reserve(topics_.size());
   for (const auto& topic : topics_) all.push_back(topic->take_misfit());
   return all;
 }
