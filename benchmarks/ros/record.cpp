@@ -9,6 +9,8 @@
 #include <cstdio>
 #include <memory>
 
+#include "mauve_rt/base/time.hpp"
+
 #include "ros/bare_node.hpp"
 #include "support/options.hpp"
 
