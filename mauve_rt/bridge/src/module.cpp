@@ -73,15 +73,16 @@ Typed<"list[tuple[int, bytes]]"> messages_of(const MessageBatch& self, std::size
   return all;
 }
 
-Typed<"tuple[bytes, list[tuple[int, int, int, bytes]]]"> pack(
-    MessageBatch& self, const std::vector<std::uint16_t>& channels, time_ns_t log_ahead_ns,
+/// The records stay where they are: a copy would cost page faults for each of 30 MB/s.
+Typed<"tuple[memoryview, list[tuple[int, int, int, bytes]]]"> pack(
+    const py::object& batch, const std::vector<std::uint16_t>& channels, time_ns_t log_ahead_ns,
     time_ns_t publish_ahead_ns, time_ns_t earliest_log_ns, std::uint64_t offset) {
   const BagClock clock{
       .log_ahead_ns = log_ahead_ns, .publish_ahead_ns = publish_ahead_ns, .earliest_log_ns = earliest_log_ns};
   py::list parts;
-  for (const ChannelPart& part : self.pack(channels, clock, offset))
+  for (const ChannelPart& part : batch.cast<MessageBatch&>().pack(channels, clock, offset))
     parts.append(py::make_tuple(part.channel, part.first_ns, part.last_ns, python_bytes(part.index)));
-  return py::make_tuple(python_bytes(self.records()), parts);
+  return py::make_tuple(py::memoryview(batch), parts);
 }
 
 Typed<"list[tuple[int, int, int]]"> counts_of(const MessageBatch& self) {
@@ -196,8 +197,13 @@ A stop is carried out and answered; for a transition outputs are made safe, and 
       .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
            py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,
            py::arg("liveliness") = 0, py::arg("lease_ns") = 0);
-  py::class_<MessageBatch>(module, "MessageBatch",
+  py::class_<MessageBatch>(module, "MessageBatch", py::buffer_protocol(),
                            "Messages of a TopicReceiver as records of an MCAP file, one behind the other.")
+      .def_buffer([](MessageBatch& self) {
+        const std::span<const std::byte> all = self.records();
+        return py::buffer_info(reinterpret_cast<const std::uint8_t*>(all.data()),
+                               static_cast<py::ssize_t>(all.size()));
+      })
       .def_property_readonly("sizes", &MessageBatch::sizes, "Messages of each topic.")
       .def_property_readonly("counts", &counts_of,
                              "(received, lost before, lost here for want of room) of each topic, so far.")

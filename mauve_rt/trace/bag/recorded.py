@@ -68,7 +68,7 @@ class ReceivedBatch(Protocol):
         publish_ahead_ns: int,
         earliest_log_ns: int,
         offset: int,
-    ) -> "tuple[bytes, Sequence[PackedChannel]]":
+    ) -> "tuple[memoryview, Sequence[PackedChannel]]":
         """Complete the records for a place in a chunk; once. Channel 0 leaves a topic out."""
 
 

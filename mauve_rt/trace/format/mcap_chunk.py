@@ -67,7 +67,7 @@ class PendingChunk:
         self.counts.add(channel_id, log_time_ns)
         self._indexes.setdefault(channel_id, bytearray()).extend(entry)
 
-    def add_packed(self, records: bytes, channels: Sequence[tuple[int, int, int, bytes]]) -> None:
+    def add_packed(self, records: memoryview, channels: Sequence[tuple[int, int, int, bytes]]) -> None:
         """Append whole records: of each channel its first and last log time and the entries of its index."""
         self.records += records
         for channel_id, start_ns, end_ns, entries in channels:
