@@ -13,7 +13,6 @@ from mauve_rt.trace.bag.recorded import ReceivedTopic
 
 _DEPTH = 5000  # of a subscription: 5 s at 1 kHz, while the receiving thread has no CPU
 _OFFERED_DEPTH = 100  # by who plays the bag
-QUEUE_BYTES = 64 * 1024 * 1024  # that may wait for a flush
 
 
 class ChosenTopic(NamedTuple):
@@ -34,16 +33,21 @@ class ReceivedTopics:
     """
 
     def __init__(
-        self, node: LifecycleNode, chosen: Sequence[ChosenTopic], *, bound: Callable[[], Mapping[str, str]]
+        self,
+        node: LifecycleNode,
+        chosen: Sequence[ChosenTopic],
+        *,
+        bound: Callable[[], Mapping[str, str]],
+        queue_bytes: int,
     ) -> None:
-        """Subscribe; `bound`: the topics that resources are bound to now.
+        """Subscribe; `bound`: the topics that resources are bound to now; so much may wait for a flush.
 
         Raises:
             ParameterError: the middleware refuses a topic; none is subscribed to then.
 
         """
         self._bound = bound
-        self._receiver = TopicReceiver(node.handle.pointer, limit_bytes=QUEUE_BYTES)
+        self._receiver = TopicReceiver(node.handle.pointer, limit_bytes=queue_bytes)
         self._chosen = tuple(chosen)
         self._ignored: set[str] = set()
         self.topics = tuple(

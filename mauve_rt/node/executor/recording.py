@@ -80,8 +80,11 @@ class Recording:
     | `_last`          | stop()           | exchanged whole |
     """
 
-    def __init__(self, node: LifecycleNode, runtime: Runtime, bound: BoundResources) -> None:
-        """Take the node whose trace it is."""
+    def __init__(
+        self, node: LifecycleNode, runtime: Runtime, bound: BoundResources, *, queue_bytes: int
+    ) -> None:
+        """Take the node whose trace it is; so much of other nodes' messages may wait for the recorder."""
+        self._queue_bytes = queue_bytes
         self._node = node
         self._runtime = runtime
         self._bound = bound
@@ -122,7 +125,11 @@ class Recording:
         with self._lock:
             self.stop()
             # First: what is refused here leaves no folder behind.
-            received = ReceivedTopics(self._node, chosen, bound=self._bound.types) if chosen else None
+            received = None
+            if chosen:
+                received = ReceivedTopics(
+                    self._node, chosen, bound=self._bound.types, queue_bytes=self._queue_bytes
+                )
             self._received = received
             self._shadows = RecordedShadows(self._runtime, name, _serialized)
             try:

@@ -24,7 +24,7 @@ from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import component_statistics
-from mauve_rt.trace.recording.trace_bag import LEDGER, Entry
+from mauve_rt.trace.recording.trace_bag import LEDGER, ledger_of
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
@@ -257,13 +257,32 @@ def test_a_burst_of_others_is_in_the_bag_or_counted(
         time.sleep(0.001)
     assert stop(graph).success
     numbers = numbers_of(tmp_path / "bag", "/burst")
-    entry = Entry(**json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])["/burst"])
+    entry = ledger_of(examine_bag(tmp_path / "bag").custom_data)["/burst"]
     assert (entry.lost, entry.numbered) == (0, True)
     assert entry.received == len(numbers)
     assert entry.received + entry.lost_before == numbers[-1] - numbers[0] + 1
     kinds = {finding.kind for finding in check_bag(tmp_path / "bag") if "/burst" in finding.text}
     assert kinds == {"loss" if entry.lost_before else "note"}
     assert_rosbag2_reads(tmp_path / "bag")
+
+
+def test_messages_beyond_the_queue_of_the_recorder_are_lost_and_counted(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+) -> None:
+    words = (f"architecture:={architecture}", f"bags:={tmp_path}", "record_queue_bytes:=1000000")
+    start_executor(*(word for given in words for word in ("-p", given)))
+    topic = "/large:std_msgs/msg/UInt8MultiArray:reliable"
+    reply = start(graph, bag="bag", topics=[topic])
+    assert reply.success, reply.message
+    voice = graph.voice(UInt8MultiArray, "/large")
+    voice.publish(UInt8MultiArray(data=bytes(2_000_000)))
+    graph.spin_until(voice.wait_for_all_acked, "the message to arrive")
+    reply = stop(graph)
+    assert "; 1 were dropped" in reply.message
+    entry = ledger_of(examine_bag(tmp_path / "bag").custom_data)["/large"]
+    assert (entry.received, entry.lost, entry.lost_before) == (1, 1, 0)
+    losses = [finding.text for finding in check_bag(tmp_path / "bag") if finding.is_loss]
+    assert losses == ["topic /large: 1 of 1 messages that came are not in the bag"]
 
 
 def test_messages_lost_before_the_recorder_are_reported_everywhere(
