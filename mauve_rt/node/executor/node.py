@@ -92,9 +92,7 @@ class ExecutorNode(LifecycleNode):
         self._values = Values(runtime)
         self._sentinel = Sentinel(self, runtime, self._bound)
         self._mirrors = Mirrors(self, self._values, self._bound)
-        self._recording = Recording(
-            self, runtime, self._bound, queue_bytes=settings["record_queue_bytes"]
-        )
+        self._recording = Recording(self, runtime, self._bound, queue_bytes=settings["record_queue_bytes"])
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._properties = Parameters(self, runtime)
         self._judge = Judge(runtime, uses=self._bound.bindings, others=real_time_threads)

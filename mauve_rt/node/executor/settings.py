@@ -29,7 +29,7 @@ PARAMETERS: dict[str, Setting] = {
         [], "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
     ),
     "record_queue_bytes": Setting(
-        64 * 1024 * 1024,
+        67_108_864,  # 64 MiB
         "messages of other nodes that may wait for the recorder, in bytes; it counts those beyond as lost",
         minimum=1_000_000,
     ),
