@@ -215,6 +215,18 @@ A stop is carried out and answered; for a transition outputs are made safe, and 
 
 Channels: of each topic, 0 leaves its messages out. Returns the records, and (channel, first and last log
 time, entries of its message index) of each channel.)");
+  py::class_<SequenceGaps>(module, "SequenceGaps",
+                           "Messages lost before they came, by the sequence numbers of their writers.")
+      .def(py::init())
+      .def(
+          "follow",
+          [](SequenceGaps& self, const std::string& writer, std::uint64_t sequence) {
+            rmw_gid_t gid{};
+            writer.copy(reinterpret_cast<char*>(gid.data), sizeof gid.data);
+            return self.follow(gid, sequence);
+          },
+          py::arg("writer"), py::arg("sequence"),
+          "Of a message of a writer, named by up to 16 characters; returns how many were lost so far.");
   py::class_<TopicReceiver>(
       module, "TopicReceiver",
       R"(Receives topics of other nodes for a recorder, by an ordinary thread without the interpreter.

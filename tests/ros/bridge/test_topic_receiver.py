@@ -10,7 +10,7 @@ from rclpy.qos import QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import UInt8MultiArray, UInt64
 
-from mauve_rt._bridge import TopicReceiver
+from mauve_rt._bridge import SequenceGaps, TopicReceiver
 from mauve_rt.errors import MauveError
 from mauve_rt.interfaces.qos import native_qos
 
@@ -139,6 +139,21 @@ def test_writers_are_counted_each_by_itself(graph: Any, make: Make) -> None:
     taken = Taken(receiver)
     graph.spin_until(lambda: taken.take(small) == 300, "all messages")
     assert taken.counts == (300, 0, 0)
+
+
+def test_a_message_that_was_overtaken_is_not_lost() -> None:
+    gaps = SequenceGaps()
+    assert [gaps.follow("a", sequence) for sequence in (10, 11, 14)] == [0, 0, 2]
+    assert gaps.follow("b", 700) == 2, "what a writer sent before its first message is not known"
+    assert [gaps.follow("a", sequence) for sequence in (12, 15)] == [1, 1]
+
+
+def test_a_writer_that_sent_last_is_forgotten_last() -> None:
+    gaps = SequenceGaps()
+    for number in range(1000):
+        assert gaps.follow(str(number), 1) == gaps.follow("a", number) == 0
+    assert gaps.follow("999", 3) == 1
+    assert gaps.follow("0", 9) == 1, "forgotten: it counts from here"
 
 
 def test_a_batch_becomes_records_without_those_of_channel_0(graph: Any, make: Make) -> None:
