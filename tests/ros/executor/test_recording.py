@@ -266,6 +266,28 @@ def test_a_burst_of_others_is_in_the_bag_or_counted(
     assert_rosbag2_reads(tmp_path / "bag")
 
 
+def test_a_topic_to_which_a_resource_is_bound_later_is_recorded_once(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+) -> None:
+    assert start(graph, bag="bag", topics=["/later:std_msgs/msg/Float64:reliable"]).success
+    voice = graph.voice(Float64, "/later")
+    voice.publish(Float64(data=0.0))
+    graph.spin_until(voice.wait_for_all_acked, "the message to arrive")
+    text = "{kind: shared_data, type: std_msgs/msg/Float64, topic: {name: /later, direction: subscribe}}"
+    step = ReconfigurationStep(kind="add_resource", target="later", value=text)
+    added = graph.ask(Reconfigure, f"{EXECUTOR}/reconfigure", steps=[step])
+    assert added.success, added.message
+    graph.spin_until(lambda: voice.get_subscription_count() == 2, "the subscription of the resource")
+    time.sleep(1.0)  # flushes: from the first one on the recorder ignores the topic
+    for number in range(1, 11):
+        voice.publish(Float64(data=float(number)))
+    graph.spin_until(voice.wait_for_all_acked, "the messages to arrive")
+    assert stop(graph).success
+    assert numbers_of(tmp_path / "bag", "/later") == [*range(11)]
+    entry = ledger_of(examine_bag(tmp_path / "bag").custom_data)["/later"]
+    assert (entry.received, entry.lost) == (11, 0)
+
+
 def test_messages_beyond_the_queue_of_the_recorder_are_lost_and_counted(
     architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
 ) -> None:
