@@ -1,6 +1,6 @@
 """Runs a C++ program that uses rcl alone.
 
-rcl_program.py publish|subscribe|send|take [--name value ...]
+rcl_program.py publish|subscribe|send|take|record [--name value ...]
 
 Some of rcl's libraries want an interpreter's symbols, so that the program is a function of a library that an
 interpreter calls. No Python runs while it does.

@@ -48,9 +48,9 @@ def recording_rows(settings: Settings) -> Iterator[Row]:
 
         def recorded(number: int) -> _Recorded:
             bag = bags / f"round_{number}"
-            _ask(client, executor, StartRecording, "start_recording", StartRecording.Request(bag=bag.name))
+            ask(client, executor, StartRecording, "start_recording", StartRecording.Request(bag=bag.name))
             cpu_percent = _cpu_percent(executor.pid, settings.recording_s)
-            _ask(client, executor, StopRecording, "stop_recording", StopRecording.Request())
+            ask(client, executor, StopRecording, "stop_recording", StopRecording.Request())
             return _of_bag(bag, cpu_percent)
 
         def not_recorded(_: int) -> _Recorded:
@@ -88,7 +88,12 @@ def _of_bag(bag: Path, cpu_percent: float) -> _Recorded:
     return _Recorded(cpu_percent, 1e9 * count / max(end_ns - begin_ns, 1), size / max(count, 1), trace.lost)
 
 
-def _ask(client: Client, executor: ExecutorProcess, service_type: type, name: str, request: object) -> None:
+def ask(client: Client, executor: ExecutorProcess, service_type: type, name: str, request: object) -> None:
+    """Call a service of the executor.
+
+    Raises:
+        BenchmarkError: the answer is no.
+    """
     reply = client.call(service_type, f"{executor.namespace}/executor/{name}", request, wait_s=_START_S)
     if not reply.success:
         raise BenchmarkError(f"{name} refused: {reply.message}")

@@ -45,6 +45,7 @@ from reconfiguration import (
 from recording import recording_rows
 from recording_kept import kept_rows
 from recording_killed import kill_rows
+from recording_topics import recording_topics_rows
 from reload import reload_rows
 from rows import Row, markdown, not_available
 from rules import rule_rows
@@ -98,6 +99,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "recording": recording_rows,
     "recording-killed": kill_rows,
     "recording-kept": kept_rows,
+    "recording-topics": recording_topics_rows,
     "reading": reading_rows,
     "analysis": analysis_rows,
     "proof": proof_rows,

@@ -130,7 +130,7 @@ def _check(args: argparse.Namespace) -> int:
         print(f"{finding.kind}: {finding.text}")
     bad = [finding for finding in findings if finding.kind != "note"]
     if not bad:
-        print(f"{bag}: whole, nothing is missing, no split change found")
+        print(f"{bag}: whole, nothing of the executor is missing, no split change found")
     elif any(finding.is_damage for finding in bad):
         print(f"`mauve trace repair {bag}` makes a bag of it that every reader opens")
     return REFUSED if bad else OK

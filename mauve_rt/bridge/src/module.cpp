@@ -13,6 +13,7 @@
 #include "qos.hpp"
 #include "steady_waits.hpp"
 #include "stop_guard.hpp"
+#include "topic_receiver.hpp"
 #include "types.hpp"
 
 namespace py = pybind11;
@@ -52,7 +53,7 @@ std::size_t open_mirror(Bridge& self, const std::string& resource, const std::st
                      {.period_ns = period_ns, .numbers = numbers, .number = number});
 }
 
-py::bytes python_bytes(const std::vector<std::byte>& data) {
+py::bytes python_bytes(std::span<const std::byte> data) {
   return {reinterpret_cast<const char*>(data.data()), data.size()};
 }
 
@@ -61,6 +62,33 @@ Typed<"list[tuple[int, int, bytes]]"> take_log(Bridge& self) {
   for (const LoggedMessage& message : self.log().take()) {
     all.append(py::make_tuple(message.topic, message.time_ns, python_bytes(message.data)));
   }
+  return all;
+}
+
+Typed<"list[tuple[int, bytes]]"> messages_of(const MessageBatch& self, std::size_t topic) {
+  py::list all;
+  self.each(topic, [&all](time_ns_t time_ns, std::span<const std::byte> message) {
+    all.append(py::make_tuple(time_ns, python_bytes(message)));
+  });
+  return all;
+}
+
+/// The records stay where they are: a copy would cost page faults for each of 30 MB/s.
+Typed<"tuple[memoryview, list[tuple[int, int, int, bytes]]]"> pack(
+    const py::object& batch, const std::vector<std::uint16_t>& channels, time_ns_t log_ahead_ns,
+    time_ns_t publish_ahead_ns, time_ns_t earliest_log_ns, std::uint64_t offset) {
+  const BagClock clock{
+      .log_ahead_ns = log_ahead_ns, .publish_ahead_ns = publish_ahead_ns, .earliest_log_ns = earliest_log_ns};
+  py::list parts;
+  for (const ChannelPart& part : batch.cast<MessageBatch&>().pack(channels, clock, offset))
+    parts.append(py::make_tuple(part.channel, part.first_ns, part.last_ns, python_bytes(part.index)));
+  return py::make_tuple(py::memoryview(batch), parts);
+}
+
+Typed<"list[tuple[int, int, int]]"> counts_of(const MessageBatch& self) {
+  py::list all;
+  for (const ReceivedCounts& one : self.counts)
+    all.append(py::make_tuple(one.received, one.lost_before, one.lost));
   return all;
 }
 
@@ -169,6 +197,67 @@ A stop is carried out and answered; for a transition outputs are made safe, and 
       .def(py::init(&make_qos), py::kw_only(), py::arg("reliability"), py::arg("durability"),
            py::arg("depth"), py::arg("deadline_ns") = 0, py::arg("lifespan_ns") = 0,
            py::arg("liveliness") = 0, py::arg("lease_ns") = 0);
+  py::class_<MessageBatch>(module, "MessageBatch", py::buffer_protocol(),
+                           "Messages of a TopicReceiver as records of an MCAP file, one behind the other.")
+      .def_buffer([](MessageBatch& self) {
+        const std::span<const std::byte> all = self.records();
+        return py::buffer_info(reinterpret_cast<const std::uint8_t*>(all.data()),
+                               static_cast<py::ssize_t>(all.size()));
+      })
+      .def_property_readonly("sizes", &MessageBatch::sizes, "Messages of each topic.")
+      .def_property_readonly("counts", &counts_of,
+                             "(received, lost before, lost here for want of room) of each topic, so far.")
+      .def("messages", &messages_of, py::arg("topic"),
+           "(CLOCK_MONOTONIC ns, CDR) of each message of a topic; before pack().")
+      .def("pack", &pack, py::arg("channels"), py::kw_only(), py::arg("log_ahead_ns"),
+           py::arg("publish_ahead_ns"), py::arg("earliest_log_ns"), py::arg("offset"),
+           R"(Complete the records for a place in a chunk; once.
+
+Channels: of each topic, 0 leaves its messages out. Returns the records, and (channel, first and last log
+time, entries of its message index) of each channel.)");
+  py::class_<SequenceGaps>(module, "SequenceGaps",
+                           "Messages lost before they came, by the sequence numbers of their writers.")
+      .def(py::init())
+      .def(
+          "follow",
+          [](SequenceGaps& self, const std::string& writer, std::uint64_t sequence) {
+            rmw_gid_t gid{};
+            writer.copy(reinterpret_cast<char*>(gid.data), sizeof gid.data);
+            return self.follow(gid, sequence);
+          },
+          py::arg("writer"), py::arg("sequence"),
+          "Of a message of a writer, named by up to 16 characters; returns how many were lost so far.");
+  py::class_<TopicReceiver>(
+      module, "TopicReceiver",
+      R"(Receives topics of other nodes for a recorder, by an ordinary thread without the interpreter.
+
+The messages stay serialized. Of each topic it counts what it received, what was lost before (gaps in the
+sequence numbers of a writer) and what found no room.)")
+      .def(py::init([](std::uintptr_t node, std::size_t limit_bytes) {
+             return std::make_unique<TopicReceiver>(*std::bit_cast<rcl_node_t*>(node), limit_bytes);
+           }),
+           py::arg("node"), py::kw_only(), py::arg("limit_bytes"),
+           "Take the address of a node that outlives close(), and how much may wait for take().")
+      .def_static("numbered", &TopicReceiver::numbered,
+                  "Whether the middleware numbers the messages of each writer, so that gaps are known.")
+      .def("subscribe", &TopicReceiver::subscribe, py::arg("topic"), py::arg("type"), py::arg("qos"),
+           Unlocked(),
+           R"(Subscribe, before start(); returns the number of the topic, counted from 0.
+
+Raises:
+    MauveError: the type is not installed, or the middleware refuses.)")
+      .def("start", &TopicReceiver::start, Unlocked(), "Receive from now on.")
+      .def("stop", &TopicReceiver::stop, Unlocked(),
+           "End, when all that has arrived is taken. May be called again.")
+      .def("close", &TopicReceiver::close, Unlocked(),
+           "stop(), and end the subscriptions; what came stays for take().")
+      .def("take", &TopicReceiver::take, Unlocked(), "What came since the last call.")
+      .def("ignore", &TopicReceiver::ignore, py::arg("number"), py::arg("on"), Unlocked(),
+           "Neither keep nor count the messages of a topic from now on, or do again.")
+      .def("take_misfits", &TopicReceiver::take_misfits, Unlocked(),
+           R"(Of each topic the quality of service in which a publisher did not fit since the last call.
+
+As rclpy's QoSPolicyKind; 0: none.)");
   py::class_<TopicTroubles>(
       module, "TopicTroubles",
       "What the middleware tells of a topic besides its messages. Counts since it was opened.")

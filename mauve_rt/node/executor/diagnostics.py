@@ -300,7 +300,11 @@ class Diagnostics:
         return self._status("changes", DiagnosticStatus.WARN, "; ".join(lines), {"open": len(changes)})
 
     def _bag(self, status: RecordingStatus) -> Any:
-        remarks = self._grown("recording", {"messages dropped": status.dropped})
+        counts = {
+            "messages dropped": status.dropped,
+            "messages of other nodes lost before the recorder received them": status.lost_before,
+        }
+        remarks = self._grown("recording", counts)
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         message = "; ".join(remarks) or ("recording" if status.recording else "stopped")
         if not (status.recording or status.is_complete):
@@ -311,7 +315,12 @@ class Diagnostics:
             "bag": status.bag,
             "messages": status.messages,
             "dropped_messages": status.dropped,
+            "lost_before": status.lost_before,
         }
+        for topic, entry in status.others.items():
+            values[f"received[{topic}]"] = entry.received
+            values[f"lost_before[{topic}]"] = entry.lost_before if entry.numbered else "not known"
+            values[f"lost[{topic}]"] = entry.lost
         return self._status("recording", level, message, values)
 
     def _grown(self, name: str, counts: Mapping[str, int]) -> list[str]:

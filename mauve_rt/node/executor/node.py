@@ -96,7 +96,7 @@ class ExecutorNode(LifecycleNode):
             self,
             runtime,
             self._bound,
-            data_group=MutuallyExclusiveCallbackGroup(),
+            queue_bytes=settings["record_queue_bytes"],
             waits_for_room=settings["bag_waits_for_room"],
         )
         self._state = StatePublisher(self, runtime, self._recording, self.watch)

@@ -1,17 +1,14 @@
 """The bags of an executor: its trace, messages it sends and receives, topics it is asked to record."""
 
-import functools
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
-from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.lifecycle import LifecycleNode
-from rclpy.qos import QoSPolicyKind, QoSProfile
+from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
 
 from mauve_rt._kernel import monotonic_ns
@@ -20,19 +17,20 @@ from mauve_rt.control.requests import Code, Outcome, RecordingOrder, RefusalErro
 from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.errors import MauveError, ParameterError, one_line
 from mauve_rt.interfaces.descriptions import trace_architecture
-from mauve_rt.interfaces.qos import qos_profile, recorded_qos
+from mauve_rt.interfaces.qos import recorded_qos
 from mauve_rt.interfaces.recorded_shadows import RecordedShadows
 from mauve_rt.model import message_class
 from mauve_rt.model.schema import QOS_NAMES
 from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
+from mauve_rt.node.executor.received_topics import ChosenTopic, ReceivedTopics
 from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
     from mauve_rt.trace.recording.recorder import MessageSource, Recorder
+    from mauve_rt.trace.recording.trace_bag import Entry
 
-_DEPTH = 100  # of the topics recorded beside the executor's own
 _BEST_EFFORT = "best_effort"
 
 
@@ -48,18 +46,6 @@ _OWN = {  # recorded in any case
 }
 
 
-class ChosenTopic(NamedTuple):
-    """A topic to record beside the executor's own."""
-
-    name: str
-    """As it was given; the node resolves it."""
-    full_name: str
-    type_name: str
-    message: type
-    qos: str
-    """One of QOS_NAMES."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class RecordingStatus:
     """How the recording fares, the present or the last one."""
@@ -69,10 +55,18 @@ class RecordingStatus:
     messages: int
     """In the bag, the trace's own among them."""
     dropped: int
+    """Of those that came, not in the bag."""
+    others: "Mapping[str, Entry]"
+    """What became of the messages of each topic of other nodes."""
     error: str
     """Why it ended by itself, or is paused; empty when it did not."""
     is_complete: bool
     """The recording has ended, and the bag is closed."""
+
+    @property
+    def lost_before(self) -> int:
+        """Messages of other nodes that were lost before they came here."""
+        return sum(entry.lost_before for entry in self.others.values())
 
 
 class RecordingBusyError(MauveError):
@@ -89,7 +83,7 @@ class Recording:
     | `_recorder`      | start(), stop()  | exchanged whole |
     | `_is_starting`, `_is_called_off` | start(), stop() | `_lock` |
     | `_shadows`       | start()          | `_lock`         |
-    | `_subscriptions` | start(), stop()  | `_lock`         |
+    | `_received`      | start(), stop()  | exchanged whole |
     | `_chosen`        | start(), stop()  | exchanged whole |
     | `_told`          | look()           |                 |
     | `_last`          | stop()           | exchanged whole |
@@ -101,24 +95,25 @@ class Recording:
         runtime: Runtime,
         bound: BoundResources,
         *,
-        data_group: CallbackGroup,
+        queue_bytes: int,
         waits_for_room: bool = False,
     ) -> None:
-        """Take the node whose trace it is; chosen topics are received in `data_group`.
+        """Take the node whose trace it is.
 
+        `queue_bytes`: so much of other nodes' messages may wait for the recorder.
         `waits_for_room`: a disk that refuses to write pauses a recording; else it ends it.
         """
         self._node = node
         self._runtime = runtime
         self._bound = bound
-        self._data_group = data_group
+        self._queue_bytes = queue_bytes
         self._waits_for_room = waits_for_room
         self._lock = threading.RLock()
         self._recorder: Recorder | None = None
         self._shadows: RecordedShadows | None = None
         self._last: Recorder | None = None  # its disk may still write
         self._is_starting = self._is_called_off = False
-        self._subscriptions: list[Any] = []
+        self._received: ReceivedTopics | None = None
         self._chosen: tuple[ChosenTopic, ...] = ()
         self._told: set[tuple[str, str]] = set()  # topics, and types of others on them
 
@@ -159,6 +154,7 @@ class Recording:
                 split=split,
                 on_error=self._node.get_logger().error,
                 messages=_Sources(self._bound, RecordedValues(self._runtime, recorded), shadows),
+                topics=self._received,
                 keeper=native_program("bag_keeper"),
                 waits_for_room=self._waits_for_room,
             )
@@ -186,7 +182,10 @@ class Recording:
             if self.recording:
                 raise RecordingBusyError("it records already; stop that first")
             self.stop()
-            self._subscribe(chosen)
+            if chosen:
+                self._received = ReceivedTopics(
+                    self._node, chosen, bound=self._bound.types, queue_bytes=self._queue_bytes
+                )
             self._is_starting, self._is_called_off = True, False
 
     def _record_into(
@@ -209,13 +208,14 @@ class Recording:
         """
         with self._lock:
             recorder = self._recorder
-            self._unsubscribe()
             self._is_called_off = self._is_starting
             if recorder is None:
+                self._unsubscribe()
                 return None
             if self._shadows is not None:
                 self._shadows.finish()
             is_complete = recorder.stop()
+            self._unsubscribe()
             self._last, self._recorder = recorder, None
             status = _status(recorder)
         if not is_complete:
@@ -241,9 +241,14 @@ class Recording:
             recorder.record(topic, type_name, data, monotonic_ns=monotonic_ns(), qos=offered)
 
     def look(self) -> None:
-        """Warn of nodes that use another type on a topic to record. One thread at a time."""
+        """Warn of nodes that use another type or quality of service on a topic. One thread at a time."""
         if not (chosen := self._chosen):
             return
+        received = self._received
+        for topic, policy in received.misfits() if received is not None else ():
+            self._warn(
+                topic, f"a publisher's quality of service does not fit, in {policy}: it is not recorded"
+            )
         known = dict(self._node.get_topic_names_and_types())
         for topic in chosen:
             for other in set(known.get(topic.full_name, ())) - {topic.type_name}:
@@ -297,57 +302,17 @@ class Recording:
             raise ParameterError(
                 f"topic {full_name} to record: used as {' and '.join(known)}, found {type_name}"
             )
-        message = message_class(type_name)
-        if message is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
+        if message_class(type_name) is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
             expected = "name, name:package/msg/Type of an installed message, and perhaps one of"
             expected = f"{expected} {', '.join(f':{word}' for word in QOS_NAMES)}"
             raise ParameterError(f"topic to record: expected {expected}; found '{topic}'")
-        return ChosenTopic(name, full_name, type_name, message, qos or _BEST_EFFORT)
-
-    def _subscribe(self, topics: Sequence[ChosenTopic]) -> None:
-        try:
-            for topic in topics:
-                profile = qos_profile(topic.qos, capacity=_DEPTH)
-                # Not by its full name: resolved twice, it might be another.
-                subscription = self._node.create_subscription(
-                    topic.message,
-                    topic.name,
-                    functools.partial(self._hear, topic, profile),
-                    profile,
-                    raw=True,
-                    callback_group=self._data_group,
-                    event_callbacks=self._event_callbacks(topic),
-                )
-                self._subscriptions.append(subscription)
-        except Exception as error:  # rclpy has an exception class of its own for each mistake
-            self._unsubscribe()
-            raise ParameterError(f"topic {topic.full_name} to record: {one_line(str(error))}") from error
+        return ChosenTopic(name, full_name, type_name, qos or _BEST_EFFORT)
 
     def _unsubscribe(self) -> None:
         self._chosen = ()
-        for subscription in self._subscriptions:
-            self._node.destroy_subscription(subscription)
-        self._subscriptions.clear()
-
-    def _hear(self, topic: ChosenTopic, qos: QoSProfile, data: bytes) -> None:
-        if (
-            topic.full_name not in self._bound.types()
-        ):  # else a resource was bound to it since, and records it
-            self.record(topic.full_name, topic.type_name, data, qos=qos)
-
-    def _event_callbacks(self, topic: ChosenTopic) -> SubscriptionEventCallbacks:
-        def lost(event: Any) -> None:
-            recorder = self._recorder
-            if recorder is not None:
-                recorder.lose(topic.full_name, event.total_count_change)
-
-        def misfits(event: Any) -> None:
-            policy = QoSPolicyKind(event.last_policy_kind).name.lower()
-            self._warn(
-                topic, f"a publisher's quality of service does not fit, in {policy}: it is not recorded"
-            )
-
-        return SubscriptionEventCallbacks(incompatible_qos=misfits, message_lost=lost)
+        received, self._received = self._received, None
+        if received is not None:
+            received.close()
 
     def _warn(self, topic: ChosenTopic, what: str) -> None:
         self._node.get_logger().warning(f"topic {topic.full_name} to record: {what}")
@@ -368,6 +333,7 @@ def _status(recorder: "Recorder") -> RecordingStatus:
         recording=recorder.recording,
         messages=recorder.message_count,
         dropped=recorder.dropped_messages,
+        others=recorder.others,
         error=recorder.error,
         is_complete=recorder.is_closed,
     )
@@ -443,6 +409,8 @@ class RecordingOrders:
         words = f"{status.messages:,} messages are in {status.bag}"
         if status.dropped:
             words += f"; {status.dropped:,} were dropped"
+        if status.lost_before:
+            words += f"; {status.lost_before:,} of other nodes were lost before they came here"
         if status.error:
             words += f"; it had ended by itself: {status.error}"
         return Outcome(code=Code.OK, message=words, bag=status.bag)

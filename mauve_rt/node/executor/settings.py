@@ -28,6 +28,11 @@ PARAMETERS: dict[str, Setting] = {
     "record_topics": Setting(
         [], "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
     ),
+    "record_queue_bytes": Setting(
+        67_108_864,  # 64 MiB
+        "messages of other nodes that may wait for the recorder, in bytes; it counts those beyond as lost",
+        minimum=1_000_000,
+    ),
     "bag_split_s": Setting(
         60.0, "time after which a recording goes on in a new file, in s; 0: never", _CONFIGURED, minimum=0
     ),

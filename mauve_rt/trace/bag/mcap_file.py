@@ -31,6 +31,7 @@ from typing import NamedTuple
 
 from mauve_rt.counts import counted
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, MetadataError
+from mauve_rt.trace.bag.recorded import ReceivedBatch
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
 from mauve_rt.trace.format.mcap_records import Opcode, record, room
@@ -125,6 +126,19 @@ class McapFile:
     def add_message(self, channel_id: int, log_time_ns: int, data: bytes, *, publish_time_ns: int) -> None:
         """Keep a message for the next flush. Times in ns of CLOCK_REALTIME."""
         self._chunk.add(channel_id, log_time_ns, data, publish_time_ns=publish_time_ns)
+
+    def add_batch(
+        self, batch: ReceivedBatch, channels: Sequence[int], *, ahead_ns: tuple[int, int], earliest_ns: int
+    ) -> None:
+        """Keep the messages of a batch for the next flush; `ahead_ns`: of log and of publish times."""
+        packed = batch.pack(
+            channels,
+            log_ahead_ns=ahead_ns[0],
+            publish_ahead_ns=ahead_ns[1],
+            earliest_log_ns=earliest_ns,
+            offset=len(self._chunk.records),
+        )
+        self._chunk.add_packed(*packed)
 
     def flush(self, *, metadata: Callable[[], Metadata] | None = None, sync: bool = False) -> None:
         """Write what waits, then the metadata.yaml that tells of it; the file is complete before and after.

@@ -22,13 +22,11 @@ from mauve_rt.trace.bag.mcap_library import (
     DataEnd,
     Message,
     MessageIndex,
-    Metadata,
     Opcode,
     Schema,
     serialized,
 )
 from mauve_rt.trace.bag.mcap_scan import Found, McapScan, Told
-from mauve_rt.trace.bag.metadata import CUSTOM_DATA
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts
 from mauve_rt.trace.progress import Progress, silent
@@ -198,7 +196,6 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
     counts = Counts()
     chunks = _Chunks()
     chunk_count = 0
-    custom_data: Mapping[str, str] = {}
     others = {int(Opcode.ATTACHMENT): 0, int(Opcode.METADATA): 0}
     with McapScan(path) as scan:
         for found in scan.found():
@@ -207,8 +204,6 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             chunk_count += isinstance(record, Chunk)
             if found.opcode in others:
                 others[found.opcode] += 1
-            if isinstance(record, Metadata) and record.name == CUSTOM_DATA:
-                custom_data = record.metadata
             for _, one in found.inside:
                 if isinstance(one, Message):
                     counts.add(one.channel_id, one.log_time)
@@ -235,7 +230,7 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             is_in_order=all(
                 one.message_start_time <= other.message_start_time for one, other in pairwise(entries)
             ),
-            custom_data=custom_data,
+            custom_data=scan.custom_data,
             _chunk_indexes=entries,
             _chunk_count=chunk_count,
             _missing_indexes=missing,

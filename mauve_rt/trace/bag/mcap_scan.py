@@ -7,7 +7,7 @@ its last whole chunk.
 import os
 import time
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple, Self
@@ -24,6 +24,7 @@ from mauve_rt.trace.bag.mcap_library import (
     McapError,
     McapRecord,
     Message,
+    Metadata,
     Opcode,
     Schema,
     Statistics,
@@ -32,6 +33,7 @@ from mauve_rt.trace.bag.mcap_library import (
     split_records,
 )
 from mauve_rt.trace.bag.mcap_limits import MAX_DEFINITION_BYTES, McapLimits
+from mauve_rt.trace.bag.metadata import CUSTOM_DATA
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.mcap_records import HEAD
 
@@ -83,6 +85,8 @@ class McapScan:
         """The record that ends the data, once the pass has come to it."""
         self.damage = ""
         """Why the pass ended early; empty when it did not."""
+        self.custom_data: Mapping[str, str] = {}
+        """What the last metadata record of CUSTOM_DATA tells, once the pass has come to it."""
         try:
             self._file = path.open("rb")
         except OSError as error:
@@ -134,6 +138,8 @@ class McapScan:
             if isinstance(found.record, DataEnd):
                 self.data_end = found.record
                 self.whole_bytes = found.offset
+            if isinstance(found.record, Metadata) and found.record.name == CUSTOM_DATA:
+                self.custom_data = found.record.metadata
             for _, one in found.inside:
                 if isinstance(one, Schema):
                     self.schemas[one.id] = one

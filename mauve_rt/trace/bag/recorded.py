@@ -1,7 +1,8 @@
 """What is recorded and how, as plain values: for who only names it, without what writes bags."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 _FOREVER = "{sec: 9223372036, nsec: 854775807}"  # RMW_DURATION_INFINITE
 
@@ -35,6 +36,44 @@ class SentMessage(NamedTuple):
     qos: TopicQos | None
     definition: str = ""
     """Of a type that no installed package has: the .msg text, as a bag stores it."""
+
+
+class ReceivedTopic(NamedTuple):
+    """A topic of other nodes that is recorded."""
+
+    name: str
+    type_name: str
+    qos: TopicQos
+
+
+class ReceivedBatch(Protocol):
+    """Messages of such topics as records of an MCAP file (`mauve_rt._bridge.MessageBatch`)."""
+
+    @property
+    def sizes(self) -> Sequence[int]:
+        """Messages of each topic."""
+
+    @property
+    def counts(self) -> Sequence[tuple[int, int, int]]:
+        """(received, lost before, lost here for want of room) of each topic, so far."""
+
+    def messages(self, topic: int) -> Sequence[tuple[int, bytes]]:
+        """(ns of the clock that the trace is on, CDR) of each message of a topic; before pack()."""
+
+    def pack(
+        self,
+        channels: Sequence[int],
+        *,
+        log_ahead_ns: int,
+        publish_ahead_ns: int,
+        earliest_log_ns: int,
+        offset: int,
+    ) -> "tuple[memoryview, Sequence[PackedChannel]]":
+        """Complete the records for a place in a chunk; once. Channel 0 leaves a topic out."""
+
+
+PackedChannel = tuple[int, int, int, bytes]
+"""Channel, first and last log time, entries of its message index."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ rosbag2 makes them are read, of a file that sqlite3 itself finds whole.
 """
 
 import sqlite3
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
 from typing import Self
@@ -44,6 +44,7 @@ class SqliteScan:
         self.library = "rosbag2 (sqlite3)"
         self.whole_bytes = 0
         self.damage = ""
+        self.custom_data: Mapping[str, str] = {}
         self.schemas: dict[int, Schema] = {}
         self.channels: dict[int, Channel] = {}
         try:

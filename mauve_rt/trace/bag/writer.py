@@ -13,7 +13,7 @@ import mauve_rt
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
 from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
-from mauve_rt.trace.bag.recorded import TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, TopicQos
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
 from mauve_rt.unfinished import beside
@@ -165,6 +165,16 @@ class BagWriter:
         published_ns = log_time_ns if publish_time_ns is None else publish_time_ns
         log_time_ns = max(log_time_ns, self._flushed_ns)
         self._file.add_message(known.channel_id, log_time_ns, data, publish_time_ns=published_ns)
+
+    def write_batch(
+        self, batch: ReceivedBatch, topics: Sequence[str | None], *, ahead_ns: tuple[int, int]
+    ) -> None:
+        """Keep the messages of a batch for the next flush; `ahead_ns`: of log and of publish times.
+
+        `topics`: the declared topic of each number in the batch; None leaves its messages out.
+        """
+        channels = [self._topics[topic].channel_id if topic is not None else 0 for topic in topics]
+        self._file.add_batch(batch, channels, ahead_ns=ahead_ns, earliest_ns=self._flushed_ns)
 
     def set_custom_data(self, key: str, value: str) -> None:
         """Put a word about the recording into metadata.yaml and the present file at the next flush."""

@@ -2,6 +2,7 @@
 
 import struct
 import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from mauve_rt.trace.format.mcap_records import HEAD, Opcode, record
@@ -33,6 +34,12 @@ class Counts:
         self.end_ns = max(self.end_ns, log_time_ns)
         self.by_channel[channel_id] = self.by_channel.get(channel_id, 0) + 1
 
+    def add_many(self, channel_id: int, messages: int, *, start_ns: int, end_ns: int) -> None:
+        """Count messages of one channel."""
+        added = Counts({channel_id: messages}, start_ns, end_ns)
+        both = self.plus(added)
+        self.by_channel, self.start_ns, self.end_ns = both.by_channel, both.start_ns, both.end_ns
+
     def plus(self, other: "Counts") -> "Counts":
         """Return the counts of both together; neither is changed."""
         if not self.by_channel or not other.by_channel:
@@ -59,6 +66,14 @@ class PendingChunk:
         self.records += data
         self.counts.add(channel_id, log_time_ns)
         self._indexes.setdefault(channel_id, bytearray()).extend(entry)
+
+    def add_packed(self, records: memoryview, channels: Sequence[tuple[int, int, int, bytes]]) -> None:
+        """Append whole records: of each channel its first and last log time and the entries of its index."""
+        self.records += records
+        for channel_id, start_ns, end_ns, entries in channels:
+            messages = len(entries) // _INDEX_ENTRY.size
+            self.counts.add_many(channel_id, messages, start_ns=start_ns, end_ns=end_ns)
+            self._indexes.setdefault(channel_id, bytearray()).extend(entries)
 
     def build(self, offset: int) -> tuple[list[bytes | bytearray], bytes]:
         """Return the chunk and its message indexes for this place in the file, in parts, and its index."""

@@ -16,7 +16,13 @@ from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry, Interruption
+from mauve_rt.trace.recording.trace_bag import (
+    DROPPED_MESSAGES,
+    INTERRUPTIONS,
+    Entry,
+    Interruption,
+    ledger_of,
+)
 
 
 @dataclass(frozen=True)
@@ -53,8 +59,9 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
     trace = open_trace(path, progress=part(progress, 0.5, 1.0))
     found += [Finding(_words(name, loss), is_loss=True) for name, loss in trace.losses.items() if loss.lost]
     found += [Finding(_interruption_words(one), is_loss=True) for one in _interruptions(state)]
-    ledger = _ledger(state)
+    ledger = ledger_of(state.custom_data)
     found += [Finding(text, is_loss=True) for text in _missing(state, ledger)]
+    found += [Finding(text, is_loss=True) for text in _lost_before(ledger)]
     if dropped := _dropped_messages(state) - sum(entry.lost for entry in ledger.values()):
         found.append(
             Finding(f"{dropped:,} messages of topics were dropped on their way into the bag", is_loss=True)
@@ -69,7 +76,7 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         for name, rows in trace.records.items()
         for split in split_changes(rows)
     ]
-    return found + _notes(trace)
+    return found + _notes(trace) + [Finding(text) for text in _not_known(ledger)]
 
 
 def _words(component: str, loss: Loss) -> str:
@@ -101,15 +108,6 @@ def _dropped_messages(state: BagState) -> int:
     return int(text) if text.isdigit() else 0
 
 
-def _ledger(state: BagState) -> Mapping[str, Entry]:
-    """What metadata.yaml tells of each topic; nothing in a bag of an earlier version."""
-    try:
-        told = json.loads(state.custom_data.get(LEDGER, "{}"))
-        return {topic: Entry(**fields) for topic, fields in told.items()}
-    except (ValueError, TypeError, AttributeError):  # somebody else wrote it
-        return {}
-
-
 def _interruptions(state: BagState) -> list[Interruption]:
     try:
         return [Interruption(**fields) for fields in json.loads(state.custom_data.get(INTERRUPTIONS, "[]"))]
@@ -130,6 +128,33 @@ def _missing(state: BagState, ledger: Mapping[str, Entry]) -> Iterator[str]:
         if entry.lost or absent > 0:
             lost = entry.lost + max(absent, 0)
             yield f"topic {topic}: {lost:,} of {entry.received:,} messages that came are not in the bag"
+
+
+def _lost_before(ledger: Mapping[str, Entry]) -> Iterator[str]:
+    for topic, entry in ledger.items():
+        if entry.lost_before:
+            by = "gaps in the numbers of their writers" if entry.numbered else "report of the middleware"
+            lost = counted(entry.lost_before, "message")
+            yield (
+                f"topic {topic}: {lost} lost before the recorder received them, by {by}; "
+                f"{entry.received:,} came. Record {topic} with :reliable if its publisher is reliable"
+            )
+
+
+def _not_known(ledger: Mapping[str, Entry]) -> Iterator[str]:
+    """Of the topics of other nodes nothing tells what was sent."""
+    others = {topic: entry for topic, entry in ledger.items() if entry.numbered is not None}
+    whole = [topic for topic, entry in others.items() if entry.numbered and not entry.lost_before]
+    if whole:
+        yield (
+            f"{', '.join(whole)}: no gap between the first and the last message of each writer; "
+            "whether messages were sent before and after these is not known"
+        )
+    if unnumbered := [topic for topic, entry in others.items() if not entry.numbered]:
+        yield (
+            f"{', '.join(unnumbered)}: the middleware numbers no messages: "
+            "whether more of them were lost before the recorder received them is not known"
+        )
 
 
 def _notes(trace: Trace) -> list[Finding]:

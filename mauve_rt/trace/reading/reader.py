@@ -29,6 +29,7 @@ from mauve_rt.trace.reading.decisions import RULES, traced_decisions
 from mauve_rt.trace.reading.facts import OWN_TYPES, BagFile, Deployment, Loss, Message
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE, Shadow
 from mauve_rt.trace.reading.trace import Trace
+from mauve_rt.trace.recording.trace_bag import Entry, ledger_of
 
 if TYPE_CHECKING:
     from mauve_rt.trace.bag.sqlite_scan import SqliteScan
@@ -67,6 +68,7 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
             for channel, message in scan.messages():
                 content.add(scan, channel, message.data, published_ns=message.publish_time)
                 progress((done + scan.whole_bytes) / max(sum(sizes), 1), "reading")
+            content.ledger = ledger_of(scan.custom_data) or content.ledger
             content.files.append(BagFile(file, scan.library, scan.whole_bytes, scan.damage))
         done += size
     return content.trace(files)
@@ -85,6 +87,7 @@ class _Content:
 
     def __init__(self, path: Path) -> None:
         self.files: list[BagFile] = []
+        self.ledger: dict[str, Entry] = {}  # as the last file tells
         self._path = path
         self._topics: set[str] = set()
         self._all_topics: dict[str, tuple[str, int]] = {}
@@ -166,6 +169,7 @@ class _Content:
             first_grids=self._first_grids or {},
             files=tuple(self.files),
             topics=self._all_topics,
+            ledger=self.ledger,
             kinds=self._kinds,
             decisions=traced_decisions(decided, self._names, self._kinds),
             shadow_reports=tuple(

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
+    from mauve_rt.trace.recording.trace_bag import Entry
 
 _CLOCK_STEP_NS = 500_000_000  # a clock that is slewed gains at most 0.5 ms in a second
 _SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this
@@ -55,6 +56,8 @@ class Trace:
     """What it was read from."""
     topics: Mapping[str, tuple[str, int]] = field(default_factory=dict)
     """Of every topic in the bag, the trace's own too: type and number of messages."""
+    ledger: Mapping[str, "Entry"] = field(default_factory=dict)
+    """What became of the messages of each topic; empty where the bag does not tell."""
     kinds: Mapping[int, RecordKind] = field(default_factory=kinds_known)
     """What the kinds of records are called, as told in the bag: newer ones than this reader's among them."""
     decisions: tuple[TracedDecision, ...] = ()
@@ -202,6 +205,7 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         },
         files=tuple(file for trace in traces.values() for file in trace.files),
         topics=_all_topics(traces.values()),
+        ledger=_all_entries(traces.values()),
         kinds={number: kind for trace in traces.values() for number, kind in trace.kinds.items()},
         decisions=_all_decisions(traces),
         shadow_reports=tuple(
@@ -224,6 +228,14 @@ def _all_topics(traces: Iterable[Trace]) -> dict[str, tuple[str, int]]:
     for trace in traces:
         for topic, (type_name, count) in trace.topics.items():
             found[topic] = (type_name, count + found.get(topic, ("", 0))[1])
+    return found
+
+
+def _all_entries(traces: Iterable[Trace]) -> dict[str, "Entry"]:
+    found: dict[str, Entry] = {}
+    for trace in traces:
+        for topic, entry in trace.ledger.items():
+            found[topic] = found[topic].plus(entry) if topic in found else entry
     return found
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
-from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage, Split, TopicQos
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.recording.tap import Tap
 from mauve_rt.trace.recording.trace_bag import (
@@ -16,7 +16,9 @@ from mauve_rt.trace.recording.trace_bag import (
     DROPPED_MESSAGES,
     NAMES,
     Drain,
+    Entry,
     MessageSource,
+    TopicSource,
     TraceBag,
     TraceSource,
 )
@@ -28,6 +30,7 @@ __all__ = [
     "Drain",
     "MessageSource",
     "Recorder",
+    "TopicSource",
     "TraceSource",
 ]
 
@@ -73,6 +76,7 @@ class Recorder:
         split: Split | None = None,
         on_error: Callable[[str], None] | None = None,
         messages: MessageSource | None = None,
+        topics: TopicSource | None = None,
         keeper: Path | None = None,
         waits_for_room: bool = False,
     ) -> None:
@@ -88,6 +92,7 @@ class Recorder:
             split: when the bag goes on in a new file; after a minute unless said otherwise.
             on_error: called at most once for each cause, with one line, on the recorder thread.
             messages: asked, on the recorder thread, for messages beside those given to record().
+            topics: of other nodes; it is stopped when the recording ends by itself.
             keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
             waits_for_room: a disk that refuses to write pauses the recording; else it ends the recording.
@@ -102,7 +107,10 @@ class Recorder:
         self._on_error = on_error
         self._waits_for_room = waits_for_room
         self._try_at_s = 0.0  # when paused
-        self._tap = Tap(source, messages)
+        self._tap = Tap(source, messages, topics)
+        self._topics = topics
+        self._others: dict[str, Entry] = {}
+        self._refused: Counter[str] = Counter()  # of topics of other nodes
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
             source, directory, node_name=node_name, on_error=self._report, split=split, disk=disk
@@ -149,8 +157,14 @@ class Recorder:
     def dropped_messages(self) -> int:
         """Messages that were to be recorded and did not get into the bag."""
         elsewhere = self._tap.dropped_messages()
+        others = sum(entry.lost for entry in self._others.values())
         with self._lock:
-            return self._lost.total() + elsewhere
+            return self._lost.total() + others + elsewhere
+
+    @property
+    def others(self) -> dict[str, Entry]:
+        """What became of the messages of each topic of other nodes, as of the last flush."""
+        return self._others
 
     def start(self, *, discard: bool = False) -> None:
         """Start the thread. Once only.
@@ -197,12 +211,6 @@ class Recorder:
             self._waiting.append(SentMessage(topic, type_name, data, monotonic_ns, qos))
             self._waiting_bytes += len(data)
             return True
-
-    def lose(self, topic: str, count: int) -> None:
-        """Messages of a topic were sent, and lost before they came here. From any thread."""
-        with self._lock:
-            self._received[topic] += count
-            self._lost[topic] += count
 
     def stop(self) -> bool:
         """Take the last records, flush, close the bag. May be called again.
@@ -278,6 +286,8 @@ class Recorder:
     def _interrupt(self, error: DiskError) -> None:
         """Count what is lost with the flush that failed, and what came since."""
         lost = self._bag.interrupt(str(error))
+        for topic in lost.keys() & self._others.keys():
+            self._refused[topic] += lost.pop(topic)
         with self._lock:
             self._lost += lost
         self._skip()
@@ -287,14 +297,18 @@ class Recorder:
         """Count what came: it is lost."""
         with self._lock:
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
-        drain, taken = self._tap.take()
+        drain, taken, batch = self._tap.take()
         more = Counter(message.topic for message in taken)
+        if self._topics is not None and batch is not None:
+            for topic, count in zip(self._topics.topics, batch.sizes, strict=True):
+                self._refused[topic.name] += count
+            self._others = self._entries(self._topics, batch)
         with self._lock:
             self._received += more
             self._lost += more + Counter(message.topic for message in waiting)
             received, lost = self._received.copy(), self._lost.copy()
         self._bag.skip(drain)
-        self._bag.tell_ledger(received, lost)
+        self._bag.tell_ledger(received, lost, self._others)
         self._bag.tell_dropped(self.dropped_messages)
 
     def _write_last_words(self) -> None:
@@ -327,17 +341,31 @@ class Recorder:
                 self._received.copy(),
                 self._lost.copy(),
             )  # with what waits: the bag tells of no more
-        drain, taken = self._tap.take()
+        drain, taken, batch = self._tap.take()
         more = Counter(message.topic for message in taken)
         waiting += taken
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)
+        if self._topics is not None and batch is not None:
+            self._refused += self._bag.write_received(batch, self._topics.topics, drain)
+            self._others = self._entries(self._topics, batch)
         with self._lock:
             self._received += more
             self._lost += refused
-        self._bag.tell_ledger(received + more, lost + refused)
+        self._bag.tell_ledger(received + more, lost + refused, self._others)
         self._bag.tell_dropped(self.dropped_messages)
+
+    def _entries(self, source: TopicSource, batch: ReceivedBatch) -> dict[str, Entry]:
+        return {
+            topic.name: Entry(
+                received=received,
+                lost=lost + self._refused[topic.name],
+                lost_before=lost_before,
+                numbered=source.numbered,
+            )
+            for topic, (received, lost_before, lost) in zip(source.topics, batch.counts, strict=True)
+        }
 
     def _report(self, text: str) -> None:
         if self._on_error is not None:

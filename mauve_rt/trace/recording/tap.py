@@ -4,8 +4,8 @@ import threading
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from mauve_rt.trace.bag.recorded import SentMessage
-from mauve_rt.trace.recording.trace_bag import Drain, Drained, MessageSource, TraceSource
+from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage
+from mauve_rt.trace.recording.trace_bag import Drain, Drained, MessageSource, TopicSource, TraceSource
 
 
 class Taken(NamedTuple):
@@ -13,6 +13,8 @@ class Taken(NamedTuple):
 
     drain: Drain
     messages: Sequence[SentMessage]
+    received: ReceivedBatch | None
+    """Of topics of other nodes; None: there are none to record, or the last ones are taken."""
 
 
 class Tap:
@@ -26,10 +28,13 @@ class Tap:
     | `_is_open`, `_last`, `_dropped`, sources  | `_lock`    |
     """
 
-    def __init__(self, source: TraceSource, messages: MessageSource | None) -> None:
+    def __init__(
+        self, source: TraceSource, messages: MessageSource | None, topics: TopicSource | None
+    ) -> None:
         """Take nothing before open()."""
         self._source = source
         self._messages = messages
+        self._topics = topics
         self._dropped_before = messages.dropped_messages() if messages is not None else 0
         self._dropped = 0
         self._is_open = False
@@ -56,7 +61,7 @@ class Tap:
                 raise RuntimeError(msg)
             taken, drain = self._last, self._last.drain
             empty = Drained(b"", drain.written, drain.dropped, drain.monotonic_ns, drain.realtime_ns)
-            self._last = Taken(empty, ())
+            self._last = Taken(empty, (), None)
             return taken
 
     def dropped_messages(self) -> int:
@@ -70,6 +75,8 @@ class Tap:
             if not self._is_open:
                 return
             try:
+                if self._topics is not None:
+                    self._topics.stop()  # the last messages stay
                 self._last = self._take()
                 self._dropped = self._count_dropped()
             finally:
@@ -81,7 +88,8 @@ class Tap:
     def _take(self) -> Taken:
         # Messages before the drain: then no message is later than the clock pair that maps it.
         messages = self._messages.take_messages() if self._messages is not None else ()
-        return Taken(self._source.drain_trace(), messages)
+        received = self._topics.take() if self._topics is not None else None
+        return Taken(self._source.drain_trace(), messages, received)
 
     def _count_dropped(self) -> int:
         return self._messages.dropped_messages() - self._dropped_before if self._messages is not None else 0

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple, Protocol
 
 from mauve_rt.trace.bag.disk import Disk
-from mauve_rt.trace.bag.recorded import SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
@@ -91,16 +91,58 @@ class Entry(NamedTuple):
     """One topic in the ledger of a bag."""
 
     received: int = 0
-    """Messages that were to be recorded."""
+    """Messages that came and were to be recorded."""
     lost: int = 0
     """Of these, not in the bag."""
     repeated: int = 0
     """Messages of a latched topic that later files begin with, as well."""
+    lost_before: int = 0
+    """Of a topic of other nodes: messages that were sent and did not come, as far as that is known."""
+    numbered: bool | None = None
+    """Of a topic of other nodes: whether its messages are numbered, so that gaps are known. Else null."""
 
     @property
     def recorded(self) -> int:
         """What the bag has of it."""
         return self.received - self.lost + self.repeated
+
+    def plus(self, other: "Entry") -> "Entry":
+        """Return both together: of a topic that is recorded twice, in one bag or in several."""
+        known = {self.numbered, other.numbered} - {None}
+        return Entry(
+            self.received + other.received,
+            self.lost + other.lost,
+            self.repeated + other.repeated,
+            self.lost_before + other.lost_before,
+            all(known) if known else None,
+        )
+
+
+def ledger_of(custom_data: Mapping[str, str]) -> dict[str, Entry]:
+    """Return what the custom data of a bag tells of each topic; nothing in a bag of an earlier version."""
+    try:
+        told = json.loads(custom_data.get(LEDGER, "{}"))
+        return {topic: Entry(**fields) for topic, fields in told.items()}
+    except (ValueError, TypeError, AttributeError):  # somebody else wrote it
+        return {}
+
+
+class TopicSource(Protocol):
+    """Topics of other nodes, received elsewhere."""
+
+    @property
+    def topics(self) -> Sequence[ReceivedTopic]:
+        """In the order of their numbers."""
+
+    @property
+    def numbered(self) -> bool:
+        """Whether gaps in what a writer sent are known."""
+
+    def take(self) -> ReceivedBatch:
+        """What came since the last call."""
+
+    def stop(self) -> None:
+        """Receive no longer; the last messages stay for take(). May be called again."""
 
 
 class Interruption(NamedTuple):
@@ -211,6 +253,27 @@ class TraceBag:
             self._write_batch(drain, drain.records)
         return Counter(message.topic for message in messages if not self._write_message(message, drain))
 
+    def write_received(
+        self, batch: ReceivedBatch, topics: Sequence[ReceivedTopic], drain: Drain
+    ) -> Counter[str]:
+        """Move messages of other nodes, from before the drain, into the buffer; returns what was refused."""
+        refused: Counter[str] = Counter()
+        written: list[str | None] = [None] * len(topics)
+        for number, (topic, count) in enumerate(zip(topics, batch.sizes, strict=True)):
+            if not count:
+                continue
+            if not self._declare(topic.name, topic.type_name, topic.qos):
+                refused[topic.name] += count
+            elif topic.qos.transient_local:
+                for time_ns, data in batch.messages(number):
+                    message = SentMessage(topic.name, topic.type_name, data, time_ns, topic.qos)
+                    self._write_message(message, drain)
+            else:
+                written[number] = topic.name
+        log_ahead_ns = self._log_time_ns(drain, 0)
+        self._bag.write_batch(batch, written, ahead_ns=(log_ahead_ns, drain.realtime_ns - drain.monotonic_ns))
+        return refused
+
     def discard(self, drain: Drain) -> None:
         """Leave out what was recorded before this bag; only how much it was gets into it."""
         self._last = drain
@@ -226,11 +289,16 @@ class TraceBag:
         """Note with the next flush how many messages did not get into the bag."""
         self._bag.set_custom_data(DROPPED_MESSAGES, str(messages))
 
-    def tell_ledger(self, received: Mapping[str, int], lost: Mapping[str, int]) -> None:
+    def tell_ledger(
+        self, received: Mapping[str, int], lost: Mapping[str, int], others: Mapping[str, Entry] | None = None
+    ) -> None:
         """Note with the next flush what became of the messages of each topic."""
+        told = {topic: Entry(count, lost.get(topic, 0)) for topic, count in received.items()}
+        for topic, entry in (others or {}).items():
+            # Own as well: a resource was bound to it while it was recorded.
+            told[topic] = entry.plus(told.get(topic, Entry()))
         entries = {
-            topic: Entry(count, lost.get(topic, 0), self._repeated[topic])._asdict()
-            for topic, count in received.items()
+            topic: entry._replace(repeated=self._repeated[topic])._asdict() for topic, entry in told.items()
         }
         self._bag.set_custom_data(LEDGER, json.dumps(entries))
 
@@ -365,16 +433,18 @@ class TraceBag:
             self._latched[topic] = data
             self._write(self._topic(topic), data, drain, drain.monotonic_ns)
 
-    def _write_message(self, message: SentMessage, drain: Drain) -> bool:
+    def _declare(self, topic: str, type_name: str, qos: TopicQos | None, definition: str = "") -> bool:
         try:
-            self._bag.add_topic(
-                message.topic, message.type_name, qos=message.qos, definition=message.definition
-            )
+            self._bag.add_topic(topic, type_name, qos=qos, definition=definition)
         except TraceError as error:
-            refused = (message.topic, message.type_name)
-            if refused not in self._refused_types:
-                self._refused_types.add(refused)
-                self._on_error(f"topic {message.topic} is not recorded: {error}")
+            if (topic, type_name) not in self._refused_types:
+                self._refused_types.add((topic, type_name))
+                self._on_error(f"topic {topic} is not recorded: {error}")
+            return False
+        return True
+
+    def _write_message(self, message: SentMessage, drain: Drain) -> bool:
+        if not self._declare(message.topic, message.type_name, message.qos, message.definition):
             return False
         self._write(message.topic, message.data, drain, message.monotonic_ns)
         if message.qos is not None and message.qos.transient_local:

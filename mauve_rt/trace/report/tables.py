@@ -5,6 +5,7 @@ from html import escape
 from mauve_rt.trace.reading.architecture import ComponentInfo
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.statistics import Distribution
+from mauve_rt.trace.recording.trace_bag import Entry
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.blocks import Cell, Section, details, table
 from mauve_rt.trace.report.units import share_text, time_text
@@ -101,6 +102,10 @@ def losses_section(analysis: Analysis) -> Section:
         for name, loss in analysis.trace.losses.items()
     ]
     html = table(("component", "records written", "in the bag", "lost"), rows)
+    if others := [
+        _topic_row(*item) for item in analysis.trace.ledger.items() if item[1].numbered is not None
+    ]:
+        html += table(("topic of other nodes", "received", "lost before the recorder", "lost by it"), others)
     files = [
         (file.path.name, file.library, f"{file.whole_bytes:,}", file.damage or "whole")
         for file in analysis.trace.files
@@ -108,6 +113,16 @@ def losses_section(analysis: Analysis) -> Section:
     if files:
         html += details("Files", table(("file", "written by", "bytes read", "state"), files))
     return Section("What is in the trace", html, anchor="losses")
+
+
+def _topic_row(topic: str, entry: Entry) -> tuple[object, ...]:
+    before = f"{entry.lost_before:,}{'' if entry.numbered else ' reported, more not known'}"
+    return (
+        topic,
+        entry.received,
+        Cell(before, "attention" if entry.lost_before else ""),
+        Cell(f"{entry.lost:,}", "attention" if entry.lost else ""),
+    )
 
 
 def words_section() -> str:

@@ -143,7 +143,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "wakeup_max_us: {warn: 300": (PINNED,),
     },
     "docs/howto/record_and_report.md": {
-        "mauve record start": (
+        "mauve record start /executor images": (
+            "ros/bridge/test_topic_receiver.py::test_messages_of_4_mb_are_received_or_counted",
+        ),
+        "mauve record start /executor before_lunch": (
             f"{README}every_command_is_one_that_mauve_takes",
             f"{README}service_calls_have_fields_of_their_services",
             "ros/executor/test_recording.py::test_a_bag_begun_and_ended_while_the_executor_runs",

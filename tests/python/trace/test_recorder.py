@@ -20,7 +20,7 @@ from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.recording.recorder import DROPPED_MESSAGES, Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-from mauve_rt.trace.recording.trace_bag import LEDGER
+from mauve_rt.trace.recording.trace_bag import LEDGER, Entry, TraceBag
 
 NODE = "/robot_1/executor"
 TEXT = "mauve_test_msgs/msg/Text"
@@ -236,7 +236,7 @@ def test_what_latched_topics_said_last_is_in_every_file(tmp_path: Path, source: 
     assert [counts["/description"] for counts in by_topic[first + 1 :]] == [2] * (len(by_topic) - first - 1)
     assert sum(counts.get("/said_once", 0) for counts in by_topic) == 1
     ledger = json.loads(state.custom_data[LEDGER])
-    assert ledger["/said_once"] == {"received": 1, "lost": 0, "repeated": 0}
+    assert Entry(**ledger["/said_once"]) == Entry(received=1)
     assert ledger["/description"]["received"] == 3
     assert ledger["/description"]["repeated"] == 2 * (len(by_topic) - first - 1)
 
@@ -245,7 +245,29 @@ def test_what_is_lost_of_a_topic_is_told(recorder: Recorder, source: SyntheticSo
     recorder.start()
     assert recorder.record("/text", TEXT, HELLO, monotonic_ns=time.monotonic_ns())
     assert not recorder.record("/text", TEXT, bytes(20_000), monotonic_ns=time.monotonic_ns())
-    recorder.lose("/text", 2)
     recorder.stop()
     found = {finding.kind: finding.text for finding in check_bag(recorder.directory)}
-    assert found["loss"] == "topic /text: 3 of 4 messages that came are not in the bag"
+    assert found["loss"] == "topic /text: 1 of 2 messages that came are not in the bag"
+
+
+def test_check_tells_what_is_known_of_topics_of_other_nodes(tmp_path: Path, source: SyntheticSource) -> None:
+    bag = TraceBag(source, tmp_path / "bag", node_name=NODE, on_error=lambda _: None)
+    others = {
+        "/gaps": Entry(received=0, lost_before=1, numbered=True),
+        "/no_gaps": Entry(numbered=True),
+        "/reported": Entry(lost_before=2, numbered=False),
+        "/unnumbered": Entry(numbered=False),
+    }
+    bag.write(source.drain_trace(), [], whole=True)
+    bag.tell_ledger({"/own": 0}, {}, others)
+    bag.close()
+    assert open_trace(tmp_path / "bag").ledger == {"/own": Entry(), **others}
+    found = [(finding.kind, finding.text) for finding in check_bag(tmp_path / "bag")]
+    losses = [text for kind, text in found if kind == "loss"]
+    lost = "lost before the recorder received them, by"
+    assert losses[0].startswith(f"topic /gaps: 1 message {lost} gaps in the numbers of their writers; 0 came")
+    assert losses[1].startswith(f"topic /reported: 2 messages {lost} report of the middleware; 0 came")
+    assert len(losses) == 2
+    notes = [text for kind, text in found if kind == "note" and text.startswith("/")]
+    assert notes[0].startswith("/no_gaps: no gap between the first and the last message of each writer; ")
+    assert notes[1].startswith("/reported, /unnumbered: the middleware numbers no messages: ")

@@ -4,6 +4,7 @@ import json
 import os
 import resource
 import signal
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,9 +15,10 @@ from bag_rules import assert_rosbag2_reads
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from mcap.reader import make_reader
 from preloaded import shared_library
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from ros_processes import ExecutorProcess
 from rosbags.highlevel import AnyReader
-from std_msgs.msg import Float64
+from std_msgs.msg import Float64, UInt8MultiArray, UInt64
 
 import mauve_rt.trace
 from mauve_msgs.msg import ReconfigurationStep, ReplyCode
@@ -25,7 +27,7 @@ from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import component_statistics
-from mauve_rt.trace.recording.trace_bag import LEDGER
+from mauve_rt.trace.recording.trace_bag import LEDGER, ledger_of
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
@@ -242,7 +244,7 @@ def test_a_recording_pauses_where_the_setting_says_so(
     assert_rosbag2_reads(tmp_path / "bag")
 
 
-def numbers_of(bag: Path) -> list[float]:
+def counts_of(bag: Path) -> list[float]:
     return [message.msg.data for message in mauve_rt.trace.open(bag).messages("/robot_1/count")]
 
 
@@ -270,8 +272,8 @@ def test_a_disk_that_hangs_at_a_stop_harms_no_later_recording(
     assert stop(graph).success
     for name in ("slow", "next"):
         assert check_bag(tmp_path / name) == []
-    assert numbers_of(tmp_path / "next")[-1] >= counts[-1].data
-    numbers = numbers_of(tmp_path / "next")
+    assert counts_of(tmp_path / "next")[-1] >= counts[-1].data
+    numbers = counts_of(tmp_path / "next")
     assert len(numbers) == abs(numbers[-1] - numbers[0]) + 1, "none is missing in between"
 
 
@@ -354,12 +356,115 @@ def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tm
     }
     assert heard["/robot_1/talk"] == [float(number) for number in range(20)]
     assert len(heard["/robot_1/count"]) == len({*heard["/robot_1/count"]}) > 10
-    assert check_bag(tmp_path / "bag") == []
+    (note,) = check_bag(tmp_path / "bag")
+    assert (note.kind, note.text.partition(":")[0]) == ("note", "/robot_1/talk"), "nothing of the executor"
+    assert "no gap between the first and the last message of each writer" in note.text
     ledger = json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])
-    assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0}
+    others = {"lost_before": 0, "numbered": True}
+    assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0, **others}
+    assert ledger["/robot_1/count"]["numbered"] is None
     with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
         (told,) = make_reader(stream).iter_metadata()
     assert json.loads(told.metadata[LEDGER]) == ledger, "the file by itself tells it, too"
+
+
+def numbers_of(bag: Path, topic: str) -> list[int]:
+    return [int(message.msg.data) for message in mauve_rt.trace.open(bag).messages(topic)]
+
+
+def test_a_burst_of_others_is_in_the_bag_or_counted(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+) -> None:
+    assert start(graph, bag="bag", topics=["/burst:std_msgs/msg/UInt64"]).success
+    voice = graph.voice(UInt64, "/burst", QoSProfile(depth=1000))
+    for number in range(3000):
+        voice.publish(UInt64(data=number))
+        time.sleep(0.001)
+    assert stop(graph).success
+    numbers = numbers_of(tmp_path / "bag", "/burst")
+    entry = ledger_of(examine_bag(tmp_path / "bag").custom_data)["/burst"]
+    assert (entry.lost, entry.numbered) == (0, True)
+    assert entry.received == len(numbers)
+    assert entry.received + entry.lost_before == numbers[-1] - numbers[0] + 1
+    kinds = {finding.kind for finding in check_bag(tmp_path / "bag") if "/burst" in finding.text}
+    assert kinds == {"loss" if entry.lost_before else "note"}
+    assert_rosbag2_reads(tmp_path / "bag")
+
+
+def test_a_topic_to_which_a_resource_is_bound_later_is_recorded_once(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+) -> None:
+    assert start(graph, bag="bag", topics=["/later:std_msgs/msg/Float64:reliable"]).success
+    voice = graph.voice(Float64, "/later")
+    voice.publish(Float64(data=0.0))
+    graph.spin_until(voice.wait_for_all_acked, "the message to arrive")
+    text = "{kind: shared_data, type: std_msgs/msg/Float64, topic: {name: /later, direction: subscribe}}"
+    step = ReconfigurationStep(kind="add_resource", target="later", value=text)
+    added = graph.ask(Reconfigure, f"{EXECUTOR}/reconfigure", steps=[step])
+    assert added.success, added.message
+    graph.spin_until(lambda: voice.get_subscription_count() == 2, "the subscription of the resource")
+    time.sleep(1.0)  # flushes: from the first one on the recorder ignores the topic
+    for number in range(1, 11):
+        voice.publish(Float64(data=float(number)))
+    graph.spin_until(voice.wait_for_all_acked, "the messages to arrive")
+    assert stop(graph).success
+    assert numbers_of(tmp_path / "bag", "/later") == [*range(11)]
+    entry = ledger_of(examine_bag(tmp_path / "bag").custom_data)["/later"]
+    assert (entry.received, entry.lost) == (11, 0)
+
+
+def test_messages_beyond_the_queue_of_the_recorder_are_lost_and_counted(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+) -> None:
+    words = (f"architecture:={architecture}", f"bags:={tmp_path}", "record_queue_bytes:=1000000")
+    start_executor(*(word for given in words for word in ("-p", given)))
+    topic = "/large:std_msgs/msg/UInt8MultiArray:reliable"
+    reply = start(graph, bag="bag", topics=[topic])
+    assert reply.success, reply.message
+    voice = graph.voice(UInt8MultiArray, "/large")
+    voice.publish(UInt8MultiArray(data=bytes(2_000_000)))
+    graph.spin_until(voice.wait_for_all_acked, "the message to arrive")
+    reply = stop(graph)
+    assert "; 1 were dropped" in reply.message
+    entry = ledger_of(examine_bag(tmp_path / "bag").custom_data)["/large"]
+    assert (entry.received, entry.lost, entry.lost_before) == (1, 1, 0)
+    losses = [finding.text for finding in check_bag(tmp_path / "bag") if finding.is_loss]
+    assert losses == ["topic /large: 1 of 1 messages that came are not in the bag"]
+
+
+def test_messages_lost_before_the_recorder_are_reported_everywhere(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path
+) -> None:
+    reply = start(graph, bag="bag", topics=["/burst:std_msgs/msg/UInt8MultiArray"])
+    assert reply.success, reply.message
+    told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
+    quality = QoSProfile(depth=10, reliability=ReliabilityPolicy.BEST_EFFORT)
+    voice = graph.voice(UInt8MultiArray, "/burst", quality)
+
+    def values(name: str) -> list[str]:
+        statuses = [one for array in told for one in array.status if one.name.endswith("recording")]
+        return [value.value for one in statuses for value in one.values if value.key == name]
+
+    def received() -> bool:
+        voice.publish(UInt8MultiArray(data=bytes(1000)))
+        return int((values("received[/burst]") or ["0"])[-1]) > 0
+
+    graph.spin_until(received, "a first message")
+    executor.process.send_signal(signal.SIGSTOP)
+    for _ in range(5000):  # more than the middleware keeps of a process that does not run
+        voice.publish(UInt8MultiArray(data=bytes(1000)))
+    executor.process.send_signal(signal.SIGCONT)
+
+    def lost() -> bool:
+        voice.publish(UInt8MultiArray(data=bytes(1000)))
+        return int(values("lost_before[/burst]")[-1]) > 0
+
+    graph.spin_until(lost, "the loss on /diagnostics")
+    words = "messages of other nodes lost before the recorder received them since the last status"
+    assert any(words in status.message for array in told for status in array.status)
+    assert "of other nodes were lost before they came here" in stop(graph).message
+    losses = [finding.text for finding in check_bag(tmp_path / "bag") if finding.is_loss]
+    assert any(text.startswith("topic /burst: ") and "lost before the recorder" in text for text in losses)
 
 
 def test_another_type_on_a_topic_to_record_is_told(executor: ExecutorProcess, graph: Any):

@@ -27,6 +27,7 @@ from mauve_rt.trace.reading.facts import Message
 from mauve_rt.trace.reading.trace import Trace, merge_traces
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
+from mauve_rt.trace.recording.trace_bag import Entry
 from mauve_rt.trace.report import Card, Section, Sentence, Verdict, judge, write_report
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.bags import bag_names
@@ -176,6 +177,21 @@ def test_any_trace_gives_a_page(trace: Trace, tmp_path: Path):
     assert all(name in page for name in trace.components)
     shown = re.sub(r"<script>.*</script>", "", page, flags=re.DOTALL)
     assert not re.search(r"\b(?:NaN|nan|inf|Infinity)\b", shown)
+
+
+def test_the_losses_of_topics_of_other_nodes_are_listed(tmp_path: Path) -> None:
+    ledger = {
+        "/own": Entry(received=1111),
+        "/burst": Entry(received=3000, lost=7, lost_before=386, numbered=True),
+        "/unnumbered": Entry(received=5, lost_before=2, numbered=False),
+    }
+    page = page_of(replace(periodic_trace(["c0"], 5), ledger=ledger), tmp_path)
+    rows = re.findall(r"<tr>(<td[^>]*>/.*?)</tr>", page)
+    cells = [re.sub(r"<[^>]+>", "|", row).split("||") for row in rows]
+    assert [[cell.strip("|") for cell in row] for row in cells] == [
+        ["/burst", "3,000", "386", "7"],
+        ["/unnumbered", "5", "2 reported, more not known", "0"],
+    ]
 
 
 @pytest.mark.skipif(shutil.which("dot") is None, reason="no Graphviz")
