@@ -51,8 +51,9 @@ void Commit::assign_actions() {
       }) == order_.end());
   posted_ = order_;
   if (is_idle_) {  // the lowest votes last: then its vote finds an idle instant, as a rule
-    std::stable_sort(posted_.begin(), posted_.end(), [](const Participant* a, const Participant* b) {
-      return a->task->settings().priority > b->task->settings().priority;
+    std::sort(posted_.begin(), posted_.end(), [](const Participant* a, const Participant* b) {
+      const int first = a->task->settings().priority, second = b->task->settings().priority;
+      return first != second ? first > second : a->task->number() < b->task->number();
     });
   }
   for (CommitAction* action : actions_) {
