@@ -8,10 +8,11 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from mauve_rt._kernel import PluginRegistry
-from mauve_rt.analysis.machines import ExecutionTime, Machine, State
+from mauve_rt.analysis.machines import ExecutionTime, Machine
 from mauve_rt.analysis.plan import Handovers
 from mauve_rt.analysis.study import AT_AN_IDLE_INSTANT, Study, Surroundings, study, study_of_change
 from mauve_rt.analysis.verdict import Outcome
+from mauve_rt.model.core_times import times_of_other_core
 from mauve_rt.model.schema import ComponentModel
 from mauve_rt.model.steps import Step
 from mauve_rt.model.threads import ThreadList
@@ -80,25 +81,19 @@ def with_times_of_core(
 
     `part`: the component with the core that it has; `declared`: as the file describes it.
     """
-    if declared is None or declared.core == part.core:
+    times = times_of_other_core(part, declared, registry)
+    if declared is None or not times:
         return machine
-    times = registry.describe_core(part.core).wcet_ns
-    described = {state.name: state for state in part.states}
     states = tuple(
-        replace(state, time=_own_time(state, described[state.name], times, part.core, declared.core))
-        if state.name in declared.states
-        and declared.states[state.name].wcet_ns is not None
-        and not state.is_enforced  # of whatever core
+        replace(state, time=_own_time(times[state.name], part.core, declared.core))
+        if state.name in times
         else state
         for state in machine.states
     )
     return replace(machine, states=states)
 
 
-def _own_time(
-    state: State, described: Any, times: Mapping[str, int], core: str, declared: str
-) -> ExecutionTime:
-    methods = [*([] if state.is_wait else [described.action]), *described.guards]
-    if all(method in times for method in methods):
-        return ExecutionTime(sum(times[method] for method in methods), f"declared by core {core}")
+def _own_time(time_ns: int | None, core: str, declared: str) -> ExecutionTime:
+    if time_ns is not None:
+        return ExecutionTime(time_ns, f"declared by core {core}")
     return ExecutionTime(why_missing=f"the file declares the time of core {declared}, not of {core}")

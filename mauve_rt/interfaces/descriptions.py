@@ -39,6 +39,7 @@ from mauve_rt.control.runtime import Observed, Runtime
 from mauve_rt.control.threads import threads_of
 from mauve_rt.control.wishes import step_of
 from mauve_rt.file_schema.words import cut, shown
+from mauve_rt.model.core_times import times_of_other_core
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.threads import ThreadInfo
 
@@ -60,10 +61,12 @@ def component_info(
     probations: Iterable[ProbationRecord] = (),
     shadows: Iterable[ShadowRecord] = (),
     bounds: "Iterable[WatchedBound]" = (),
+    times: Mapping[str, int | None] | None = None,
 ) -> Any:
     """ComponentInfo; `alternatives`: the cores it takes beside the present one; `authors`: by element.
 
-    `code`: generation of the core's code, and when it was built; `bounds`: of its jobs.
+    `code`: generation of the code, and when it was built; `bounds`: of its jobs; `times`: worst cases of
+    its core in place of those of the file (`times_of_other_core`).
     """
     return ComponentInfo(
         name=component.name,
@@ -93,7 +96,7 @@ def component_info(
         probations=[_probation(record) for record in probations],
         shadows=[shadow_message(record) for record in shadows],
         overrun=component.overrun,
-        states=[_state_info(state) for state in component.states],
+        states=[_state_info(state, times or {}) for state in component.states],
         authors=_authored(authors),
         bounds=[JobBound(**asdict(bound)) for bound in bounds],
     )
@@ -103,8 +106,11 @@ def _authored(authors: Mapping[str, str]) -> list[str]:
     return [f"{element or 'component'}={author}" for element, author in authors.items()]
 
 
-def _state_info(state: DescribedState) -> Any:
-    return StateInfo(**{name: getattr(state, name) for name in StateInfo.get_fields_and_field_types()})
+def _state_info(state: DescribedState, times: Mapping[str, int | None]) -> Any:
+    info = StateInfo(**{name: getattr(state, name) for name in StateInfo.get_fields_and_field_types()})
+    if state.name in times:
+        info.wcet_ns = times[state.name] or 0
+    return info
 
 
 def _state_age(component: ComponentDescription) -> dict[str, Any]:
@@ -141,6 +147,7 @@ def _component_infos(
             probations=probations.get(part.name, ()),
             shadows=[record for record in shadows if record.component == part.name],
             bounds=bounds.get(part.name, ()),
+            times=times_of_other_core(part, runtime.declared(part.name), runtime.registry),
         )
         for part in components
     ]

@@ -12,6 +12,7 @@ from mauve_rt.control.judging import Judge
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.control.timing import Timing
+from mauve_rt.interfaces.descriptions import component_infos
 from mauve_rt.model import load_architecture
 from mauve_rt.model.steps import Step
 
@@ -157,6 +158,21 @@ def test_what_is_not_declared_is_named_in_the_refusal(running: Running) -> None:
     assert refused.timing[2].missing == (why,)
     assert next(part.core for part in runtime.components()) == "executor_tests/Timed"
     assert asked(control, AGAIN).code is Code.OK
+
+
+def test_the_reply_about_a_component_has_the_times_of_its_core(running: Running) -> None:
+    control, runtime, _ = running(TIMED.replace("require_schedulable: true", "require_schedulable: warn"))
+    assert told_times(runtime)["low"] == {"Count": 1_000_000}
+    assert asked(control, BACKWARDS).code is Code.OK
+    assert told_times(runtime)["low"] == {"Count": 0}, "the file declares that of the core before"
+
+
+def told_times(runtime: SimulatedRuntime) -> dict[str, dict[str, int]]:
+    """What `mauve analyze NODE` gets: the worst case of each execution state."""
+    return {
+        info.name: {state.name: state.wcet_ns for state in info.states if not state.is_wait}
+        for info in component_infos(runtime)
+    }
 
 
 def test_warn_makes_the_change_and_says_so(running: Running) -> None:

@@ -21,7 +21,7 @@ from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
 from mauve_rt.trace.bag.disk import Disk, KeptDisk
-from mauve_rt.trace.bag.recorded import SentMessage
+from mauve_rt.trace.bag.recorded import PackedChannel, ReceivedTopic, SentMessage, TopicQos
 from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.format.records import Kind
@@ -29,7 +29,7 @@ from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER
+from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry, TopicSource
 
 
 @pytest.fixture(autouse=True)
@@ -285,7 +285,9 @@ def text_of(size: int) -> bytes:
 class Fed:
     """A recorder that a test gives records and messages, and what became of them by its own count."""
 
-    def __init__(self, directory: Path, keeper: Path | None, *, waits: bool) -> None:
+    def __init__(
+        self, directory: Path, keeper: Path | None, *, waits: bool, topics: TopicSource | None = None
+    ) -> None:
         self.errors: list[str] = []
         self.source = SyntheticSource(["c"])
         self.recorder = Recorder(
@@ -296,6 +298,7 @@ class Fed:
             flush_period_s=0.02,
             on_error=self.errors.append,
             waits_for_room=waits,
+            topics=topics,
         )
         self.messages = 0
         self.recorder.start()
@@ -408,6 +411,56 @@ def test_a_write_error_that_ends_is_a_pause(tmp_path: Path, calls: DiskCalls):
         until(lambda before=fed.recorder.message_count: fed.recorder.message_count > before, "a flush")
     assert fed.recorder.stop()
     fed.assert_told("Input/output error", count=2)
+
+
+class Others:
+    """A topic of other nodes, latched: its messages are taken one by one."""
+
+    topics = (ReceivedTopic("/others", TEXT, TopicQos(transient_local=True)),)
+    numbered = True
+    sizes = (1,)
+
+    def __init__(self) -> None:
+        self.received = 0
+        self.is_stopped = False
+
+    @property
+    def counts(self) -> list[tuple[int, int, int]]:
+        return [(self.received, 0, 0)]
+
+    def take(self) -> "Others":
+        self.received += 1
+        return self
+
+    def messages(self, _topic: int) -> list[tuple[int, bytes]]:
+        return [(self.received, text_of(self.received))]
+
+    def pack(self, _channels: object, **_places: int) -> tuple[memoryview, list[PackedChannel]]:
+        return memoryview(b""), []
+
+    def stop(self) -> None:
+        self.is_stopped = True
+
+
+def test_what_a_disk_refuses_of_topics_of_other_nodes_is_counted(tmp_path: Path, calls: DiskCalls):
+    others = Others()
+    fed = Fed(tmp_path / "bag", calls.keeper, waits=True, topics=others)
+    until(lambda: fed.recorder.message_count > 3, "flushes")
+    calls.fail("pwrite", errno.EIO)
+    until(fed.is_refused, "the error")
+    before = others.received
+    until(lambda: others.received > before + 3, "messages that are lost")
+    calls.succeed()
+    until(lambda: not fed.recorder.error, "the recording to go on")
+    assert fed.recorder.stop()
+    assert others.is_stopped
+    state = examine_bag(tmp_path / "bag")
+    entry = Entry(**json.loads(state.custom_data[LEDGER])["/others"])
+    assert entry.received == others.received
+    assert entry.lost > 3
+    recorded = sum(1 for _ in open_trace(tmp_path / "bag").messages("/others"))
+    assert entry.recorded == recorded > 0
+    assert fed.recorder.dropped_messages == int(state.custom_data[DROPPED_MESSAGES]) >= entry.lost
 
 
 def keeper_of(recorder: Recorder) -> int:
