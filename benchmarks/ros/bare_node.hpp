@@ -14,6 +14,8 @@
 #include <thread>
 #include <vector>
 
+#include "mauve_rt/base/time.hpp"
+
 namespace bench {
 
 using PointMessage = geometry_msgs__msg__Point;
@@ -59,6 +61,23 @@ inline void await_publishers(const rcl_subscription_t& subscription, std::size_t
   for (std::size_t found = 0; found < wanted;) {
     check(rcl_subscription_get_publisher_count(&subscription, &found), "publisher count");
     if (found < wanted) std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  }
+}
+
+/// Calls `take` with the number of each subscription that has messages, until told to end.
+template <typename Take>
+void take_until(const std::atomic<bool>& ending, rcl_wait_set_t& set,
+                const std::vector<rcl_subscription_t>& subscriptions, Take take) {
+  while (!ending) {
+    check(rcl_wait_set_clear(&set), "rcl_wait_set_clear");
+    for (const rcl_subscription_t& subscription : subscriptions)
+      check(rcl_wait_set_add_subscription(&set, &subscription, nullptr), "rcl_wait_set_add");
+    const rcl_ret_t outcome = rcl_wait(&set, mauve::ms_to_ns(100));
+    if (outcome == RCL_RET_TIMEOUT) continue;
+    check(outcome, "rcl_wait");
+    for (std::size_t i = 0; i < subscriptions.size(); ++i) {
+      if (set.subscriptions[i] != nullptr) take(i);
+    }
   }
 }
 

@@ -9,8 +9,6 @@
 #include <cstdio>
 #include <memory>
 
-#include "mauve_rt/base/time.hpp"
-
 #include "ros/bare_node.hpp"
 #include "support/options.hpp"
 
@@ -44,17 +42,8 @@ class BareRecorder {
   }
 
   void run(const std::atomic<bool>& ending) {
-    while (!ending) {
-      bench::check(rcl_wait_set_clear(&set_), "rcl_wait_set_clear");
-      for (const rcl_subscription_t& subscription : subscriptions_)
-        bench::check(rcl_wait_set_add_subscription(&set_, &subscription, nullptr), "rcl_wait_set_add");
-      const rcl_ret_t outcome = rcl_wait(&set_, mauve::ms_to_ns(100));
-      if (outcome == RCL_RET_TIMEOUT) continue;
-      bench::check(outcome, "rcl_wait");
-      for (std::size_t i = 0; i < subscriptions_.size(); ++i) {
-        if (set_.subscriptions[i] != nullptr) take(subscriptions_[i]);
-      }
-    }
+    bench::take_until(ending, set_, subscriptions_,
+                      [this](std::size_t number) { take(subscriptions_[number]); });
   }
 
   std::size_t taken() const { return taken_; }

@@ -44,17 +44,7 @@ class BareSubscriber {
 
   /// Takes what comes until told to end.
   void run(const std::atomic<bool>& ending) {
-    while (!ending) {
-      bench::check(rcl_wait_set_clear(&set_), "rcl_wait_set_clear");
-      for (const rcl_subscription_t& subscription : subscriptions_)
-        bench::check(rcl_wait_set_add_subscription(&set_, &subscription, nullptr), "rcl_wait_set_add");
-      const rcl_ret_t outcome = rcl_wait(&set_, mauve::ms_to_ns(100));
-      if (outcome == RCL_RET_TIMEOUT) continue;
-      bench::check(outcome, "rcl_wait");
-      for (std::size_t i = 0; i < subscriptions_.size(); ++i) {
-        if (set_.subscriptions[i] != nullptr) take(i);
-      }
-    }
+    bench::take_until(ending, set_, subscriptions_, [this](std::size_t topic) { take(topic); });
   }
 
   void write(const std::string& name) const {
