@@ -17,7 +17,7 @@ from mauve_rt.control.requests import Code
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.model.file_kinds import file_kind
-from mauve_rt.model.steps import Step, load_change
+from mauve_rt.model.steps import Change, load_change
 from mauve_rt.supervision.rehearsal import RefusedStepError, refusals_at
 from mauve_rt.supervision.rules import RulesFile
 
@@ -46,21 +46,21 @@ def plans_of_node(node: str, path: Path) -> Iterator[Plan]:
             file = RulesFile(path)
             for index, rule in enumerate(file.rules.rules):
                 try:
-                    yield _plan(client, node, f"when rule {rule.name} acts", rule.do)
+                    yield _plan(client, node, f"when rule {rule.name} acts", Change(steps=list(rule.do)))
                 except RefusedStepError as error:
                     raise file.error(("rules", index, "do", error.index), str(error)) from None
         elif kind is FileKind.STEPS:
             with refusals_at(path):
-                yield _plan(client, node, "", load_change(path).steps)
+                yield _plan(client, node, "", load_change(path))
         else:
             what = "--plan: a running executor takes steps or rules"
             problem = Problem(line=1, column=1, what=what, found="an architecture file")
             raise ArchitectureFileError(path, [problem])
 
 
-def _plan(client: Client, node: str, words: str, steps: Sequence[Step]) -> Plan:
-    listed = [ReconfigurationStep(**vars(step)) for step in steps]
-    request = Reconfigure.Request(steps=listed, dry_run=True, requested_by="mauve analyze")
+def _plan(client: Client, node: str, words: str, change: Change) -> Plan:
+    listed = [ReconfigurationStep(**vars(step)) for step in change.steps]
+    request = Reconfigure.Request(steps=listed, dry_run=True, idle=change.idle, requested_by="mauve analyze")
     reply = client.call(Reconfigure, f"{node}/reconfigure", request)
     if not reply.success and reply.code != Code.NOT_SCHEDULABLE:
         raise RefusedStepError(reply.message)

@@ -140,6 +140,10 @@ def test_the_command_asks_the_executor(required: Start, graph: Any, domain: int,
     done = analyzed(f"[{HALF.replace('HalfTimed', 'None')}]\n")
     assert done.returncode == 2
     assert "change.yaml:1:2: core 'executor_tests/None' is not installed" in done.stderr
+    done = analyzed(f"idle: true\nsteps:\n{SWAP}")
+    if has_rights:
+        assert "\nduring the change: not proved: " in done.stdout
+        assert "with the change at an idle instant" in done.stdout
     bag = tmp_path / "bag"
     done = analyzed(SWAP, "--witness", str(bag))
     if has_rights:
