@@ -3,7 +3,7 @@
 Import this module only to watch: it loads the analysis.
 """
 
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,7 +15,6 @@ from mauve_rt.analysis.machines import in_ms
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.timing import Timed, Timing
 from mauve_rt.counts import counted
-from mauve_rt.model.threads import ThreadInfo
 from mauve_rt.trace.format.jobs import traced_jobs
 
 _Key = tuple[str, str, str]
@@ -68,16 +67,10 @@ class BoundWatch:
     | `_jobs`  | look()     | exchanged whole |
     """
 
-    def __init__(
-        self,
-        runtime: Runtime,
-        *,
-        uses: Callable[[], Mapping[str, Collection[str]]] = dict,
-        others: Callable[[], Iterable[ThreadInfo]] = tuple,
-    ) -> None:
-        """`uses` and `others`: as for `threads_of`."""
+    def __init__(self, runtime: Runtime, timing: Timing) -> None:
+        """`timing`: of that runtime."""
         self._runtime = runtime
-        self._timing = Timing(runtime, uses=uses, others=others)
+        self._timing = timing
         self._timed: Timed | None = None
         self._jobs: Mapping[_Key, JobTime] = {}
 

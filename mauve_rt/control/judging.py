@@ -65,6 +65,15 @@ class Judge:
         self._timing: Timing | None = None
 
     @property
+    def timing(self) -> "Timing":
+        """What is known of what runs; it loads the analysis."""
+        from mauve_rt.control.timing import Timing  # noqa: PLC0415 - only where it is asked for
+
+        if self._timing is None:
+            self._timing = Timing(self._runtime, uses=self._uses, others=self._others)
+        return self._timing
+
+    @property
     def requirement(self) -> bool | str:
         """What the file says: True, `warn`, or False."""
         return self._runtime.model.executor.require_schedulable
@@ -100,12 +109,10 @@ class Judge:
         """
         from mauve_rt.analysis.errors import AnalysisError  # noqa: PLC0415 - only where it is asked for
         from mauve_rt.analysis.time_limit import NoVerdictError  # noqa: PLC0415
-        from mauve_rt.control.timing import VERDICT_NS, Timing  # noqa: PLC0415
+        from mauve_rt.control.timing import VERDICT_NS  # noqa: PLC0415
 
-        if self._timing is None:
-            self._timing = Timing(self._runtime, uses=self._uses, others=self._others)
         try:
-            found = self._timing.of_change(steps, always=always, is_idle=is_idle, awaits_idle=awaits_idle)
+            found = self.timing.of_change(steps, always=always, is_idle=is_idle, awaits_idle=awaits_idle)
         except NoVerdictError:
             return _not_proved(f"no verdict within {VERDICT_NS / 1e6:.0f} ms of CPU time")
         except (AnalysisError, MauveError) as error:

@@ -8,9 +8,8 @@ from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile
 
 from mauve_msgs.msg import BoundViolation
+from mauve_rt.control.judging import Judge
 from mauve_rt.control.runtime import Runtime
-from mauve_rt.model.threads import real_time_threads
-from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.shared.watch import Watch
 
 if TYPE_CHECKING:
@@ -35,15 +34,15 @@ class WatchedBounds:
         self,
         node: LifecycleNode,
         runtime: Runtime,
-        bound: BoundResources,
+        judge: Judge,
         *,
         publish: Callable[[Any, str, Any, QoSProfile], None],
         watch: Watch,
     ) -> None:
-        """`publish` sends and records a message."""
+        """`judge` has the timing of what runs; `publish` sends and records a message."""
         self._node = node
         self._runtime = runtime
-        self._bound = bound
+        self._judge = judge
         self._publish = publish
         self._watch = watch
         self._qos = QoSProfile(depth=_DEPTH)
@@ -82,7 +81,7 @@ class WatchedBounds:
         if self._watched is None:
             from mauve_rt.control.bound_watch import BoundWatch  # noqa: PLC0415 - it loads the analysis
 
-            self._watched = BoundWatch(self._runtime, uses=self._bound.bindings, others=real_time_threads)
+            self._watched = BoundWatch(self._runtime, self._judge.timing)
         self._report(self._watched.look())
 
     def _report(self, violations: "list[Violation]") -> None:

@@ -114,7 +114,7 @@ class ExecutorNode(LifecycleNode):
             watch=self.watch,
             folder=rules_folder(settings),
         )
-        self._bounds = WatchedBounds(self, runtime, self._bound, publish=self._state.send, watch=self.watch)
+        self._bounds = WatchedBounds(self, runtime, self._judge, publish=self._state.send, watch=self.watch)
         self._state.rules = self._rules.names
         self._state.changed = self._sentinel.follow
         self._folder = StateFolder(

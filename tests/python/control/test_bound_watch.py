@@ -12,6 +12,7 @@ from mauve_rt.analysis.excess import Term
 from mauve_rt.control.bound_watch import BoundWatch, Violation
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
+from mauve_rt.control.timing import Timing
 from mauve_rt.model import load_architecture
 
 MS = 1_000_000
@@ -39,7 +40,7 @@ IN_VIRTUAL_TIME = f"""{HEAD}
 def running(runtime: Runtime) -> Iterator[BoundWatch]:
     runtime.configure()
     runtime.activate()
-    watch = BoundWatch(runtime)
+    watch = BoundWatch(runtime, Timing(runtime))
     try:
         yield watch
     finally:
@@ -84,7 +85,7 @@ def test_in_virtual_time_each_job_is_judged(tmp_path: Path, plugin_prefix: Path)
     runtime.configure()
     simulation.deploy()
     runtime.activate()
-    watch = BoundWatch(runtime)
+    watch = BoundWatch(runtime, Timing(runtime))
 
     def run_to(after_epoch_ms: int) -> list[Violation]:
         simulation.run_until(runtime.host.epoch_ns + after_epoch_ms * MS)
