@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Shells written in Python, and what Python objects see of the shell of their component.
+#include "log.hpp"
 #include "python_call.hpp"
 #include "python_resource.hpp"
 #include "serialized.hpp"
@@ -91,7 +92,7 @@ class ShellBuilder {
 }  // namespace
 
 PythonShell::PythonShell(const PartFactory& factory, const PluginRegistry& registry)
-    : link_(std::make_shared<ShellLink>(ShellLink{this, nullptr})) {
+    : link_(std::make_shared<ShellLink>(ShellLink{.shell = this})) {
   set_implementation(factory.name);
   in_python([&] {
     object_.set(factory.make->get()());
@@ -217,6 +218,8 @@ Raises MauveError (not_configured) once the component is gone.)")
       .def("properties", &ShellView::properties)
       .def("clock", &ShellView::clock, "The component's logical clock, ns of CLOCK_MONOTONIC.")
       .def("period", &ShellView::period, "The component's period g in ns.")
+      .def(
+          "log", [](const ShellView& self) { return PyLog(self.link()); }, "Lines of the component.")
       .def("python", &ShellView::python, "The shell's own object, when it is written in Python.")
       .def("implementation", &ShellView::implementation);
   py::class_<ShellBuilder>(

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, Self, TypeVar, overload
 
-from mauve_rt._kernel import DataResource, Host, PartFactory, ResourceParameter
+from mauve_rt._kernel import NO_LOG, DataResource, Host, Log, PartFactory, ResourceParameter
 from mauve_rt.parts import messages
 from mauve_rt.parts.part import Configurable, implementation_name
 from mauve_rt.parts.ports import Sample
@@ -132,6 +132,12 @@ class AnyResource(ABC):
 
 class Resource(Configurable, AnyResource):
     """Base of resources written in Python; its methods marked by `service` are what ports connect to."""
+
+    _log: Log = NO_LOG
+
+    def log(self) -> Log:
+        """Lines of this resource, also those of its services on the threads of components."""
+        return self._log
 
     @classmethod
     def _part(cls) -> PartFactory:

@@ -7,6 +7,7 @@
 #include "mauve_rt/architecture/plugin.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/function_ref.hpp"
+#include "mauve_rt/base/log.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/present_state.hpp"
 #include "mauve_rt/base/thread_counters.hpp"
