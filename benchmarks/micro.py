@@ -122,7 +122,7 @@ def activation_rows(settings: Settings) -> Iterator[Row]:
 
 
 def trace_rows(settings: Settings) -> Iterator[Row]:
-    """Write a trace record."""
+    """Write a trace record, and a log line."""
     rounds = _rounds("bench_trace", settings)
     beside = "clock_gettime"
     note = "a mark on a thread that is not traced; the loop around it included"
@@ -130,6 +130,14 @@ def trace_rows(settings: Settings) -> Iterator[Row]:
     yield compared("trace record, off", off, unit="ns", beside=beside, limit=2, note=note)
     on = _block_pairs(rounds, "on", "clock")
     yield compared("trace record, on", on, unit="ns", beside=beside, ratio_limit=1.6)
+    note = "the arguments copied into the thread's ring; formatted by another thread"
+    kept = _block_pairs(rounds, "log", "on")
+    yield compared(
+        "log line with 2 doubles", kept, unit="ns", beside="trace record, on", limit=60, note=note
+    )
+    below = _block_pairs(rounds, "log_off", "clock")
+    note = "below the level of its component; the loop around it included"
+    yield compared("log line below its level", below, unit="ns", beside=beside, limit=2, note=note)
 
 
 def shadow_rows(settings: Settings) -> Iterator[Row]:

@@ -122,6 +122,7 @@ A place is `{}`, or `{:.3f}` with a precision; `{{` and `}}` are braces. Texts s
       .def("debug", &write<LogLevel::debug>, py::arg("format"), kWrite)
       .def("info", &write<LogLevel::info>, py::arg("format"), kWrite)
       .def("warn", &write<LogLevel::warn>, py::arg("format"), kWrite)
+      .def("warning", &write<LogLevel::warn>, py::arg("format"), "As warn().")
       .def("error", &write<LogLevel::error>, py::arg("format"), kWrite)
       .def("fatal", &write<LogLevel::fatal>, py::arg("format"), kWrite)
       .def(

@@ -30,7 +30,7 @@ No plug-in is needed to read a file.
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
-from mauve_rt._kernel import TASK_SETTINGS
+from mauve_rt._kernel import LOG_LEVELS, TASK_SETTINGS
 from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, given, has, reference, when
 from mauve_rt.file_schema.kinds import (
     Choice,
@@ -399,6 +399,12 @@ class ResourceModel(Section):
         default=None,
     )
 
+    log_level: Literal["debug", "info", "warn", "error", "fatal"] | None = setting(
+        Choice(*LOG_LEVELS),
+        "level from which on log lines of the resource are kept; info without it",
+        default=None,
+    )
+
     @property
     def parameters(self) -> Mapping[str, Any]:
         """Those of its kind that it is told; of a plug-in's kind as the file has them, whatever they are."""
@@ -509,6 +515,9 @@ class ComponentModel(Section):
     deadline_ns: int | None = kernel_setting(
         "deadline_ns",
         "deadline of a job after its release, for the timing analysis; without the key the next instant",
+    )
+    log_level: Literal["debug", "info", "warn", "error", "fatal"] = kernel_setting(
+        "log_level", "level from which on log lines of the component are kept"
     )
     enforce_wcet: bool = kernel_setting(
         "enforce_wcet", "fault the component when an execution uses more CPU time than its wcet_ns"

@@ -26,7 +26,15 @@ PAGES_OF_CLAIMS = (
     *(
         f"docs/howto/{name}.md"
         for name in (
-            *("compare_in_shadow", "install", "operate", "record_and_report", "reload_code", "see_values"),
+            *(
+                "compare_in_shadow",
+                "install",
+                "log_lines",
+                "operate",
+                "record_and_report",
+                "reload_code",
+                "see_values",
+            ),
             *("try_on_probation", "write_a_core"),
         )
     ),

@@ -133,6 +133,15 @@ PYBIND11_MODULE(_bridge, module) {
              R"(From here on a thread of its own writes the process's log lines to the console.
 
 Once, after rclpy.init(), which was told `--disable-stdout-logs`.)");
+  module.def(
+      "write_log_line",
+      [](int severity, const std::string& name, time_ns_t time_ns, const std::string& text,
+         const std::string& function, const std::string& file, std::size_t line) {
+        Console::write(severity, name, time_ns, text, {.function = function, .file = file, .number = line});
+      },
+      py::arg("severity"), py::arg("name"), py::arg("time_ns"), py::arg("text"), py::arg("function"),
+      py::arg("file"), py::arg("line"), Unlocked(),
+      "Write a line with a time of its own (CLOCK_REALTIME), to /rosout and the console.");
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked(),
              "Wait until all lines are written; False: the console is not read.");
   module.def("wait_by_the_monotonic_clock", &wait_by_the_monotonic_clock,

@@ -28,6 +28,7 @@ from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
 from mauve_rt.node.executor.lost_supervisors import LostSupervisors
 from mauve_rt.node.executor.mirrors import Mirrors
 from mauve_rt.node.executor.parameters import Parameters
+from mauve_rt.node.executor.part_log import PartLog
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
 from mauve_rt.node.executor.sentinel import Sentinel
@@ -99,6 +100,7 @@ class ExecutorNode(LifecycleNode):
             queue_bytes=settings["record_queue_bytes"],
             waits_for_room=settings["bag_waits_for_room"],
         )
+        self._part_log = PartLog(self, runtime, self._recording, self.watch)
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._properties = Parameters(self, runtime)
         self._judge = Judge(runtime, uses=self._bound.bindings, others=real_time_threads)
@@ -197,6 +199,7 @@ class ExecutorNode(LifecycleNode):
         )
         self._lost_supervisors = LostSupervisors(self, self._runtime, services.handle, self.watch)
         silent_after_ns = round(self._settings["node_silent_after_s"] * 1e9)
+        self._part_log.open_services(query_group)
         self._node_watch = NodeWatch(super().get_logger().name, silent_after_ns=silent_after_ns)
         self.create_timer(_HEALTH_S, self._tell_health, callback_group=query_group)
         if self._runtime.active:
@@ -382,6 +385,7 @@ class ExecutorNode(LifecycleNode):
             if self._node_watch is not None:
                 self._node_watch.stop()
             self._state.close()
+            self._part_log.close()
             self.destroy_node()
 
     def destroy_node(self) -> None:
@@ -396,6 +400,7 @@ class ExecutorNode(LifecycleNode):
     def _release(self) -> None:
         self._runtime.require_parked()
         self._state.flush()
+        self._part_log.write(last=True)
         self._recording.stop()
         self._rules.close()
         self._folder.close()

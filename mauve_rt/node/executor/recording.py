@@ -233,12 +233,25 @@ class Recording:
         recorder = self._recorder or self._last
         return None if recorder is None else _status(recorder)
 
-    def record(self, topic: str, type_name: str, data: bytes, *, qos: QoSProfile | None = None) -> None:
-        """Record a serialized message that was sent or received now."""
+    def record(
+        self,
+        topic: str,
+        type_name: str,
+        data: bytes,
+        *,
+        qos: QoSProfile | None = None,
+        instant_ns: int | None = None,
+    ) -> None:
+        """Record a serialized message that was sent or received now, or at that instant."""
         recorder = self._recorder
         if recorder is not None:
             offered = None if qos is None else recorded_qos(qos)
-            recorder.record(topic, type_name, data, monotonic_ns=monotonic_ns(), qos=offered)
+            when_ns = monotonic_ns() if instant_ns is None else instant_ns
+            recorder.record(topic, type_name, data, monotonic_ns=when_ns, qos=offered)
+
+    def takes(self, topic: str) -> bool:
+        """Whether the topic is recorded as one of other nodes, as it was asked for."""
+        return any(each.full_name == topic for each in self._chosen)
 
     def look(self) -> None:
         """Warn of nodes that use another type or quality of service on a topic. One thread at a time."""

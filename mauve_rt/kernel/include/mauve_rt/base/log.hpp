@@ -175,7 +175,8 @@ class LogRing {
   static constexpr std::size_t kCapacity = 128;
 
   /// [setup]
-  explicit LogRing(std::uint16_t component) : lines_(kCapacity), component_(component) {}
+  explicit LogRing(std::uint16_t component, std::size_t capacity = kCapacity)
+      : lines_(capacity), component_(component) {}
   /// While its thread does not run: the clock that lines are stamped by, nullptr for the monotonic one, and the state that they
   /// name. [setup]
   void set_up(const Clock* clock, const PresentState* state) noexcept {
