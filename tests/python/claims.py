@@ -35,7 +35,7 @@ PAGES_OF_CLAIMS = (
                 "reload_code",
                 "see_values",
             ),
-            *("try_on_probation", "write_a_core"),
+            *("see_values", "try_on_probation", "write_a_core"),
         )
     ),
 )
