@@ -74,7 +74,8 @@ void measure(const bench::Options& options) {
                        {"clock", clock},
                        {"log", logged(mauve::LogLevel::info), drain_log},
                        {"log_off", logged(mauve::LogLevel::warn)}});
-  if (ring.dropped() + log_ring.dropped() != 0) throw std::runtime_error("trace records or log lines were lost");
+  if (ring.dropped() + log_ring.dropped() != 0)
+    throw std::runtime_error("trace records or log lines were lost");
   line.print();
 }
 

@@ -132,9 +132,7 @@ def trace_rows(settings: Settings) -> Iterator[Row]:
     yield compared("trace record, on", on, unit="ns", beside=beside, ratio_limit=1.6)
     note = "the arguments copied into the thread's ring; formatted by another thread"
     kept = _block_pairs(rounds, "log", "on")
-    yield compared(
-        "log line with 2 doubles", kept, unit="ns", beside="trace record, on", limit=60, note=note
-    )
+    yield compared("log line with 2 doubles", kept, unit="ns", beside="trace record, on", limit=60, note=note)
     below = _block_pairs(rounds, "log_off", "clock")
     note = "below the level of its component; the loop around it included"
     yield compared("log line below its level", below, unit="ns", beside=beside, limit=2, note=note)

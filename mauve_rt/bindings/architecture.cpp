@@ -66,8 +66,7 @@ void bind_architecture(py::module_& module) {
       module, "Architecture",
       "Components and resources, connected. Parts are classes written in Python or registered names.");
   add_log_methods(architecture);
-  architecture
-      .def(py::init<PluginRegistry&>(), py::arg("registry"), py::keep_alive<1, 2>())
+  architecture.def(py::init<PluginRegistry&>(), py::arg("registry"), py::keep_alive<1, 2>())
       .def(
           "add_component",
           [](const py::object& object, const std::string& name, const AnyShell& shell, const AnyCore& core,

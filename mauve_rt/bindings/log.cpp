@@ -114,7 +114,8 @@ void PyLog::write(LogLevel level, const py::str& format, const py::args& argumen
 }
 
 void bind_log(py::module_& module) {
-  constexpr const char* kWrite = "Write a line: `warn(\"tracking error {:.3f} m\", error)`, of up to 8 arguments.";
+  constexpr const char* kWrite =
+      "Write a line: `warn(\"tracking error {:.3f} m\", error)`, of up to 8 arguments.";
   py::class_<PyLog>(module, "Log",
                     R"(Lines for the console, /rosout and the bag, formatted later on another thread.
 
@@ -126,15 +127,17 @@ A place is `{}`, or `{:.3f}` with a precision; `{{` and `}}` are braces. Texts s
       .def("error", &write<LogLevel::error>, py::arg("format"), kWrite)
       .def("fatal", &write<LogLevel::fatal>, py::arg("format"), kWrite)
       .def(
-          "is_on", [](const PyLog& self, const std::string& level) { return self.is_on(require_level(level)); },
+          "is_on",
+          [](const PyLog& self, const std::string& level) { return self.is_on(require_level(level)); },
           py::arg("level"), "Whether a line of that level is kept.");
   py::class_<LogEntry>(module, "LogEntry", "A log line.")
       .def_readonly("time_ns", &LogEntry::time_ns, "When it was written, CLOCK_MONOTONIC or simulated.")
       .def_readonly("level", &LogEntry::level, "`debug`, `info`, `warn`, `error` or `fatal`.")
       .def_readonly("component", &LogEntry::component,
                     "Whose thread wrote it, or whose hook; '': neither was a component's.")
-      .def_readonly("source", &LogEntry::source,
-                    "The resource that wrote it; `shadow`: a shadow of the component; '': the component itself.")
+      .def_readonly(
+          "source", &LogEntry::source,
+          "The resource that wrote it; `shadow`: a shadow of the component; '': the component itself.")
       .def_readonly("state", &LogEntry::state, "What the component was in; '': it ran on no thread of one.")
       .def_readonly("text", &LogEntry::text)
       .def_readonly("format", &LogEntry::format, "The text without its arguments.")
@@ -146,7 +149,6 @@ A place is `{}`, or `{:.3f}` with a precision; `{{` and `}}` are braces. Texts s
       .def_readonly("lost", &LogEntries::lost,
                     "By component ('': by threads of none): lines that found no room since the look before.");
   module.attr("NO_LOG") = PyLog(std::make_shared<ShellLink>());
-  module.attr("LOG_LEVELS") = std::vector<std::string>(kLogLevels.begin(), kLogLevels.end());
 }
 
 void add_log_methods(py::class_<PyArchitecture>& architecture) {

@@ -14,7 +14,6 @@ Attributes:
     NOT_MEASURED: In the place of a time that there is not, or not yet.
     STATE_TIMES: What add_component(states=...) takes for each execution state, in words.
     NO_LOG: Of a part that belongs to no architecture: its lines go nowhere.
-    LOG_LEVELS: Of log lines, the least urgent one first.
     KEPT: Source of overlays of rules that were active before a restart, and that the rules file lacks.
     HELD_STOPPED: Source of overlays that keep components stopped after a restart.
     STOP_TIMEOUT_NS: How long a state may go on after a stop of all components, before its component is given up.

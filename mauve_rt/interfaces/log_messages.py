@@ -5,13 +5,13 @@ from typing import Any
 from builtin_interfaces.msg import Time
 from rcl_interfaces.msg import Log
 
-from mauve_rt._kernel import LOG_LEVELS
+from mauve_rt._kernel import TASK_SETTINGS
 from mauve_rt.control.part_log import LogLine
 
 __all__ = ["LOG_TYPE", "ROSOUT", "SEVERITIES", "log_message", "logger_name"]
 
 ROSOUT, LOG_TYPE = "/rosout", "rcl_interfaces/msg/Log"
-SEVERITIES = {level: 10 * (number + 1) for number, level in enumerate(LOG_LEVELS)}
+SEVERITIES = {level: 10 * (number + 1) for number, level in enumerate(TASK_SETTINGS["log_level"].choices)}
 """Of ROS, by level; the numbers of rcl_interfaces/msg/Log and of the services of loggers."""
 
 

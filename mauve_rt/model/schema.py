@@ -30,7 +30,7 @@ No plug-in is needed to read a file.
 from collections.abc import Mapping
 from typing import Any, Literal, Self
 
-from mauve_rt._kernel import LOG_LEVELS, TASK_SETTINGS
+from mauve_rt._kernel import TASK_SETTINGS
 from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, given, has, reference, when
 from mauve_rt.file_schema.kinds import (
     Choice,
@@ -400,7 +400,7 @@ class ResourceModel(Section):
     )
 
     log_level: Literal["debug", "info", "warn", "error", "fatal"] | None = setting(
-        Choice(*LOG_LEVELS),
+        Choice(*TASK_SETTINGS["log_level"].choices),
         "level from which on log lines of the resource are kept; info without it",
         default=None,
     )

@@ -29,13 +29,14 @@ struct ConsoleLine {
   rcutils_time_point_value_t time_ns{0};
   std::string text{};
 
-  std::size_t bytes() const noexcept { return place.function.size() + place.file.size() + name.size() + text.size(); }
+  std::size_t bytes() const noexcept {
+    return place.function.size() + place.file.size() + name.size() + text.size();
+  }
 };
 
 rcutils_log_location_t location_of(const LinePlace& place) {
-  return {.function_name = place.function.c_str(),
-          .file_name = place.file.c_str(),
-          .line_number = place.number};
+  return {
+      .function_name = place.function.c_str(), .file_name = place.file.c_str(), .line_number = place.number};
 }
 
 void write_line(const ConsoleLine& line, const char* format, ...) {

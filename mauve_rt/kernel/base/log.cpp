@@ -42,8 +42,7 @@ class Arguments {
 
   /// The next one by what stands in its place; nothing: there is no more.
   std::optional<std::string> next(std::string_view spec) {
-    const LogArgument kind =
-        number_ < line_.arguments.size() ? line_.arguments[number_] : LogArgument::none;
+    const LogArgument kind = number_ < line_.arguments.size() ? line_.arguments[number_] : LogArgument::none;
     if (kind == LogArgument::none) return {};
     ++number_;
     const std::uint64_t* const value = &line_.values[at_];

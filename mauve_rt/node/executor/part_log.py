@@ -69,9 +69,12 @@ class PartLog:
     def open_services(self, group: CallbackGroup) -> None:
         """Offer the services of ROS for levels of loggers, by the names of ROS."""
         name = self._node.get_name()
-        options = {"callback_group": group}
-        self._node.create_service(GetLoggerLevels, f"{name}/get_logger_levels", self._get_levels, **options)
-        self._node.create_service(SetLoggerLevels, f"{name}/set_logger_levels", self._set_levels, **options)
+        self._node.create_service(
+            GetLoggerLevels, f"{name}/get_logger_levels", self._get_levels, callback_group=group
+        )
+        self._node.create_service(
+            SetLoggerLevels, f"{name}/set_logger_levels", self._set_levels, callback_group=group
+        )
 
     def _look(self) -> None:
         self._ending.wait(_PERIOD_S)

@@ -39,7 +39,8 @@ TEST(LogText, CutsTextsThatDoNotFit) {
   EXPECT_EQ(text.substr(0, 63), text_of("{}", text));
   EXPECT_EQ(text.substr(0, 55) + " 1", text_of("{} {}", text, 1));
   EXPECT_EQ(text.substr(0, 31) + " " + text.substr(0, 31), text_of("{} {}", text, text));
-  EXPECT_EQ(text.substr(0, 7) + " 1 2 3 4 5 6 7", text_of("{} {} {} {} {} {} {} {}", text, 1, 2, 3, 4, 5, 6, 7));
+  EXPECT_EQ(text.substr(0, 7) + " 1 2 3 4 5 6 7",
+            text_of("{} {} {} {} {} {} {} {}", text, 1, 2, 3, 4, 5, 6, 7));
 }
 
 TEST(LogQueue, CountsWhatFindsNoRoom) {
@@ -155,8 +156,8 @@ class LogOnHost : public OnBothHosts<Way> {
  protected:
   Component& add_talking(const TaskSettings& settings = {}) {
     this->architecture.template add_resource<Talking>("talking");
-    Component& component = this->architecture.template add_component<TalkingShell, TalkingCore, TalkingFsm>(
-        "c", settings);
+    Component& component =
+        this->architecture.template add_component<TalkingShell, TalkingCore, TalkingFsm>("c", settings);
     this->architecture.connect("c", "say", "talking", "say");
     return component;
   }
@@ -169,8 +170,9 @@ class LogOnHost : public OnBothHosts<Way> {
     EXPECT_TRUE(drain.lost.empty());
     std::vector<Told> all;
     for (const LogLine& line : drain.lines) {
-      all.push_back({line.component < names.size() ? names[line.component] : "", TraceNames::word(line.source),
-                     TraceNames::word(line.state), line.text(), line.level, line.time_ns});
+      all.push_back({line.component < names.size() ? names[line.component] : "",
+                     TraceNames::word(line.source), TraceNames::word(line.state), line.text(), line.level,
+                     line.time_ns});
     }
     return all;
   }

@@ -377,7 +377,8 @@ class Architecture final : public Configurable {
   void note_restructured() noexcept;
 
   PluginRegistry* registry_;
-  const std::shared_ptr<LogQueue> log_queue_{std::make_shared<LogQueue>()};  // parts that are left behind have it, too
+  const std::shared_ptr<LogQueue> log_queue_{
+      std::make_shared<LogQueue>()};  // parts that are left behind have it, too
   ChangeLock change_lock_;
   mutable CommitGate commit_gate_;
   ArchitectureClaims claims_;

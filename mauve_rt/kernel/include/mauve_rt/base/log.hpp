@@ -76,7 +76,8 @@ constexpr bool is_log_place(std::string_view spec, LogArgument argument) {
   const bool is_integer = argument == LogArgument::integer || argument == LogArgument::unsigned_integer;
   if (spec == "x") return is_integer;
   if (argument != LogArgument::number) return false;
-  if (!spec.empty() && (spec.back() == 'f' || spec.back() == 'e' || spec.back() == 'g')) spec.remove_suffix(1);
+  if (!spec.empty() && (spec.back() == 'f' || spec.back() == 'e' || spec.back() == 'g'))
+    spec.remove_suffix(1);
   if (spec.empty()) return true;
   if (spec.front() != '.' || spec.size() < 2 || spec.size() > 3) return false;
   for (const char digit : spec.substr(1)) {
@@ -93,8 +94,7 @@ class LogFormat {
  public:
   /// The text is a literal; it stays for the life of the process.
   template <std::size_t kSize>
-  consteval LogFormat(const char (&text)[kSize],
-                      std::source_location place = std::source_location::current())
+  consteval LogFormat(const char (&text)[kSize], std::source_location place = std::source_location::current())
       : text_(text), place_(place) {
     constexpr std::array<LogArgument, sizeof...(Args) + 1> kArguments{detail::log_argument<Args>()...,
                                                                       LogArgument::none};
@@ -222,9 +222,9 @@ namespace detail {
 extern constinit thread_local LogRing* this_threads_log_ring [[gnu::tls_model("initial-exec")]];
 }  // namespace detail
 
-inline LogRing* LogRing::of_this_thread() MAUVE_RT {
-  return MAUVE_RT_TRUSTED(detail::this_threads_log_ring);
-}
+/// As declared in the class. [rt]
+inline LogRing* LogRing::of_this_thread() MAUVE_RT { return MAUVE_RT_TRUSTED(detail::this_threads_log_ring); }
+/// As declared in the class. [setup]
 inline void LogRing::set_for_this_thread(LogRing* ring) noexcept { detail::this_threads_log_ring = ring; }
 
 /// What one look at an architecture's log yields.

@@ -99,9 +99,10 @@ class TraceRing {
     ring_.publish();
   }
 
-  /// As of RecordRing: the first is [rt], the second [non-rt] for one thread at a time, the others [rt].
-  void warm_up() const MAUVE_RT { ring_.warm_up(); }
+  /// As of RecordRing. [non-rt], one thread at a time.
   void drain(std::vector<TraceRecord>& into) { ring_.drain(into); }
+  /// Likewise. [rt]
+  void warm_up() const MAUVE_RT { ring_.warm_up(); }
   std::uint64_t offered() const MAUVE_RT { return ring_.offered(); }
   std::uint64_t dropped() const MAUVE_RT { return ring_.dropped(); }
 

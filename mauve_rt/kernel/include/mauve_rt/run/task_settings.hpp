@@ -39,7 +39,7 @@ struct TaskSettings {
   time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
   time_ns_t deadline_ns{0};      // from a release to the next wait, for the analysis; 0: the next instant
   LogLevel log_level{LogLevel::info};  // its log lines below are not kept; what it begins with
-  bool enforce_wcet{false};      // wcet_ns of an execution state is a budget of CPU time; a fault above it
+  bool enforce_wcet{false};  // wcet_ns of an execution state is a budget of CPU time; a fault above it
   std::vector<DeclaredState> states{};  // of the fsm's execution states
   bool operator==(const TaskSettings&) const = default;
 };
@@ -114,8 +114,10 @@ inline constexpr std::array kTaskSettings{
         .name = "log_level",
         .choices = kLogLevels,
         .get = [](const TaskSettings& all) -> SettingValue { return std::string(to_string(all.log_level)); },
-        .assign = [](TaskSettings& all,
-                     const SettingValue& value) { all.log_level = *find_log_level(std::get<std::string>(value)); }},
+        .assign =
+            [](TaskSettings& all, const SettingValue& value) {
+              all.log_level = *find_log_level(std::get<std::string>(value));
+            }},
     TaskSetting{.name = "enforce_wcet",
                 .hint = "without it nothing enforces wcet_ns",
                 .get = [](const TaskSettings& all) -> SettingValue { return all.enforce_wcet; },
