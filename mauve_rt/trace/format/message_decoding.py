@@ -33,6 +33,7 @@ class Decoder:
             ValueError: it does not tell all types that it uses, or one is not read (wstring).
 
         """
+        self.type_name = type_name
         if len(definition) > _MAX_TEXT:
             msg = f"the definition has {len(definition):,} characters, expected at most {_MAX_TEXT:,}"
             raise ValueError(msg)

@@ -1,0 +1,165 @@
+"""Messages of a bag: decoded one by one in the order of their log times, or as bytes, topic by topic."""
+
+import heapq
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from mauve_rt.trace.bag.mcap_library import Channel, Schema
+from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.message_decoding import Decoder
+from mauve_rt.trace.reading.facts import OWN_TYPES, Message
+from mauve_rt.trace.reading.stored_messages import StoredMessages
+
+_DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
+_WAITING_BYTES = 16 << 20
+_OBJECT_BYTES = 100  # what a message costs besides its own bytes, about
+
+
+class MessageTypes:
+    """What reads the messages of a bag, by the definitions in it."""
+
+    def __init__(self) -> None:
+        """Know no definition yet."""
+        self._decoders: dict[tuple[str, bytes], Decoder] = {}
+
+    def decoder(self, channel: Channel, schema: Schema | None) -> Decoder:
+        """Return what reads the messages of a channel.
+
+        Raises:
+            TraceError: the definition is not what it should be.
+
+        """
+        if schema is None or schema.encoding != "ros2msg" or channel.message_encoding != "cdr":
+            msg = f"topic {channel.topic}: expected CDR with a ros2msg definition"
+            raise TraceError(msg)
+        key = (schema.name, schema.data)
+        if key not in self._decoders:
+            try:
+                self._decoders[key] = Decoder(schema.name, schema.data.decode())
+            except ValueError as error:
+                raise _unreadable(channel.topic, schema.name, error) from error
+        return self._decoders[key]
+
+    def decoded(self, channel: Channel, schema: Schema | None, data: bytes) -> Any:
+        """Return a message as an object.
+
+        Raises:
+            TraceError: the definition or the message is not what it should be.
+
+        """
+        decoder = self.decoder(channel, schema)
+        try:
+            return decoder.decode(data)
+        except ValueError as error:
+            raise _unreadable(channel.topic, decoder.type_name, error) from error
+
+
+class Payloads(NamedTuple):
+    """Some messages of one topic, in the order of the file."""
+
+    topic: str
+    decoder: Decoder
+    log_time_ns: npt.NDArray[np.int64]
+    """CLOCK_REALTIME"""
+    monotonic_ns: npt.NDArray[np.int64]
+    data: list[bytes]
+
+    def decoded(self, index: int) -> Any:
+        """Return one of them as an object.
+
+        Raises:
+            TraceError: it is no message of the type.
+
+        """
+        try:
+            return self.decoder.decode(self.data[index])
+        except ValueError as error:
+            raise _unreadable(self.topic, self.decoder.type_name, error) from error
+
+
+def messages(
+    files: Sequence[StoredMessages], topics: tuple[str, ...], pairs: npt.NDArray[np.int64]
+) -> Iterator[Message]:
+    """Yield decoded messages by log time.
+
+    Raises:
+        TraceError: a file, or a message, cannot be read.
+
+    """
+    types = MessageTypes()
+    waiting: list[tuple[int, int, Message]] = []
+    count = 0
+    for file in files:
+        for channel, schema, log_time_ns, published_ns, data in file.messages(_wanted(topics)):
+            said = types.decoded(channel, schema, data)
+            one = Message(channel.topic, log_time_ns, monotonic_ns(published_ns, pairs), said)
+            heapq.heappush(waiting, (log_time_ns, count, one))
+            count += 1
+            while waiting[0][0] < log_time_ns - _DISORDER_NS:
+                yield heapq.heappop(waiting)[-1]
+    while waiting:
+        yield heapq.heappop(waiting)[-1]
+
+
+def payloads(
+    files: Sequence[StoredMessages], topics: tuple[str, ...], pairs: npt.NDArray[np.int64]
+) -> Iterator[Payloads]:
+    """Yield the messages of these topics as bytes; at most some megabytes of them wait.
+
+    Raises:
+        TraceError: a file, or the definition of a topic, cannot be read.
+
+    """
+    types = MessageTypes()
+    waiting: dict[tuple[str, Decoder], list[tuple[int, int, bytes]]] = {}
+    waiting_bytes = 0
+    for file in files:
+        for channel, schema, log_time_ns, published_ns, data in file.messages(_wanted(topics)):
+            key = (channel.topic, types.decoder(channel, schema))
+            waiting.setdefault(key, []).append((log_time_ns, published_ns, data))
+            waiting_bytes += len(data) + _OBJECT_BYTES
+            if waiting_bytes > _WAITING_BYTES:
+                yield from _packed(waiting, pairs)
+                waiting, waiting_bytes = {}, 0
+    yield from _packed(waiting, pairs)
+
+
+def monotonic_ns(published_ns: int, pairs: npt.NDArray[np.int64]) -> int:
+    """Undo the recorder's mapping: it used the pair of the drain that followed the message."""
+    return int(_monotonic_ns(np.array([published_ns]), pairs)[0])
+
+
+def _wanted(topics: tuple[str, ...]) -> Any:
+    """All but the trace's own topics where none is named."""
+    if not topics:
+        return lambda _, type_name: type_name not in OWN_TYPES
+    return lambda topic, type_name: topic in topics or type_name in topics
+
+
+def _packed(
+    waiting: dict[tuple[str, Decoder], list[tuple[int, int, bytes]]], pairs: npt.NDArray[np.int64]
+) -> Iterator[Payloads]:
+    for (topic, decoder), found in waiting.items():
+        logged, published, data = zip(*found, strict=True)
+        try:
+            log_time_ns, published_ns = np.array(logged, np.int64), np.array(published, np.int64)
+        except OverflowError as error:
+            msg = f"topic {topic}: a message has a time that no clock shows"
+            raise TraceError(msg) from error
+        yield Payloads(topic, decoder, log_time_ns, _monotonic_ns(published_ns, pairs), list(data))
+
+
+def _monotonic_ns(
+    published_ns: npt.NDArray[np.int64], pairs: npt.NDArray[np.int64]
+) -> npt.NDArray[np.int64]:
+    if not len(pairs):
+        return published_ns
+    index = np.minimum(np.searchsorted(pairs[:, 1], published_ns), len(pairs) - 1)
+    return published_ns - (pairs[index, 1] - pairs[index, 0])
+
+
+def _unreadable(topic: str, type_name: str, error: ValueError) -> TraceError:
+    return TraceError(f"topic {topic}: a message cannot be read as {type_name} ({error})")
