@@ -1,7 +1,7 @@
 """Messages of a bag: decoded one by one in the order of their log times, or as bytes, topic by topic."""
 
 import heapq
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,7 @@ from mauve_rt.trace.reading.stored_messages import StoredMessages
 
 _DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
 _WAITING_BYTES = 16 << 20
+_Key = tuple[str, str, Decoder]  # topic, type
 _OBJECT_BYTES = 100  # what a message costs besides its own bytes, about
 
 
@@ -54,13 +55,15 @@ class MessageTypes:
         try:
             return decoder.decode(data)
         except ValueError as error:
-            raise _unreadable(channel.topic, decoder.type_name, error) from error
+            raise _unreadable(channel.topic, "" if schema is None else schema.name, error) from error
 
 
 class Payloads(NamedTuple):
     """Some messages of one topic, in the order of the file."""
 
     topic: str
+    type_name: str
+    """As the bag calls it."""
     decoder: Decoder
     log_time_ns: npt.NDArray[np.int64]
     """CLOCK_REALTIME"""
@@ -77,7 +80,11 @@ class Payloads(NamedTuple):
         try:
             return self.decoder.decode(self.data[index])
         except ValueError as error:
-            raise _unreadable(self.topic, self.decoder.type_name, error) from error
+            raise _unreadable(self.topic, self.type_name, error) from error
+
+
+PayloadSource = Callable[[tuple[str, ...]], Iterator[Payloads]]
+"""Yields the messages of topics, or of types."""
 
 
 def messages(
@@ -114,11 +121,11 @@ def payloads(
 
     """
     types = MessageTypes()
-    waiting: dict[tuple[str, Decoder], list[tuple[int, int, bytes]]] = {}
+    waiting: dict[_Key, list[tuple[int, int, bytes]]] = {}
     waiting_bytes = 0
     for file in files:
         for channel, schema, log_time_ns, published_ns, data in file.messages(_wanted(topics)):
-            key = (channel.topic, types.decoder(channel, schema))
+            key = (channel.topic, "" if schema is None else schema.name, types.decoder(channel, schema))
             waiting.setdefault(key, []).append((log_time_ns, published_ns, data))
             waiting_bytes += len(data) + _OBJECT_BYTES
             if waiting_bytes > _WAITING_BYTES:
@@ -129,7 +136,7 @@ def payloads(
 
 def monotonic_ns(published_ns: int, pairs: npt.NDArray[np.int64]) -> int:
     """Undo the recorder's mapping: it used the pair of the drain that followed the message."""
-    return int(_monotonic_ns(np.array([published_ns]), pairs)[0])
+    return published_ns - int(_ahead_ns(published_ns, pairs))
 
 
 def _wanted(topics: tuple[str, ...]) -> Any:
@@ -140,25 +147,25 @@ def _wanted(topics: tuple[str, ...]) -> Any:
 
 
 def _packed(
-    waiting: dict[tuple[str, Decoder], list[tuple[int, int, bytes]]], pairs: npt.NDArray[np.int64]
+    waiting: dict[_Key, list[tuple[int, int, bytes]]], pairs: npt.NDArray[np.int64]
 ) -> Iterator[Payloads]:
-    for (topic, decoder), found in waiting.items():
+    for (topic, type_name, decoder), found in waiting.items():
         logged, published, data = zip(*found, strict=True)
         try:
             log_time_ns, published_ns = np.array(logged, np.int64), np.array(published, np.int64)
         except OverflowError as error:
             msg = f"topic {topic}: a message has a time that no clock shows"
             raise TraceError(msg) from error
-        yield Payloads(topic, decoder, log_time_ns, _monotonic_ns(published_ns, pairs), list(data))
+        monotonic = published_ns - _ahead_ns(published_ns, pairs)
+        yield Payloads(topic, type_name, decoder, log_time_ns, monotonic, list(data))
 
 
-def _monotonic_ns(
-    published_ns: npt.NDArray[np.int64], pairs: npt.NDArray[np.int64]
-) -> npt.NDArray[np.int64]:
+def _ahead_ns(published_ns: Any, pairs: npt.NDArray[np.int64]) -> Any:
+    """How far CLOCK_REALTIME was ahead of CLOCK_MONOTONIC at a time of publishing, or at each of several."""
     if not len(pairs):
-        return published_ns
+        return 0
     index = np.minimum(np.searchsorted(pairs[:, 1], published_ns), len(pairs) - 1)
-    return published_ns - (pairs[index, 1] - pairs[index, 0])
+    return pairs[index, 1] - pairs[index, 0]
 
 
 def _unreadable(topic: str, type_name: str, error: ValueError) -> TraceError:

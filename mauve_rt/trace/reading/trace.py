@@ -1,7 +1,7 @@
 """A trace in memory: records per component, what they mean, what is missing."""
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain
@@ -27,7 +27,7 @@ from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
-    from mauve_rt.trace.reading.messages import Payloads
+    from mauve_rt.trace.reading.messages import PayloadSource
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
     from mauve_rt.trace.recording.trace_bag import Entry
@@ -66,7 +66,7 @@ class Trace:
     """Of the executor's rules, by time; empty when it ran none."""
     shadow_reports: tuple[Shadow, ...] = ()
     """Of each shadow one report a second, and one after its end; in the order of the bag."""
-    payload_source: "Callable[[tuple[str, ...]], Iterator[Payloads]] | None" = field(repr=False, default=None)
+    payload_source: "PayloadSource | None" = field(repr=False, default=None)
     """Messages of these topics as bytes; None of a trace made by hand, which has objects only."""
 
     @property
@@ -221,7 +221,7 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
     )
 
 
-def _all_payloads(traces: Iterable[Trace]) -> "Callable[[tuple[str, ...]], Iterator[Payloads]] | None":
+def _all_payloads(traces: Iterable[Trace]) -> "PayloadSource | None":
     sources = [trace.payload_source for trace in traces]
     known = [source for source in sources if source is not None]
     if len(known) < len(sources):

@@ -6,14 +6,15 @@ Values of other topics are called by the topic: `/beat.data`.
 
 import dataclasses
 import difflib
-from array import array
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.format.message_decoding import Decoder
+from mauve_rt.trace.format.message_layout import TIME_FIELDS, Layout
 from mauve_rt.trace.reading.decisions import DECISION_TYPE
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE
@@ -21,9 +22,11 @@ from mauve_rt.trace.reading.shadows import SHADOW_TYPE
 if TYPE_CHECKING:
     import pandas as pd
 
+    from mauve_rt.trace.reading.messages import Payloads, PayloadSource
     from mauve_rt.trace.reading.trace import Trace
 
 Floats = npt.NDArray[np.float64]
+Times = npt.NDArray[np.int64]
 
 MOST_ELEMENTS = 16
 """Of an array whose elements are values; a longer one, as a laser scan, is left out."""
@@ -41,7 +44,8 @@ NO_VALUES = (
 )
 """Types of messages that report on the executor and its computer."""
 _RESOURCES = "/values/"
-_TIME = ("sec", "nanosec")
+_FEWEST_TOGETHER = 8  # fewer messages of one size are read one by one
+_MOST_LAYOUTS = 4  # of messages of one size
 _Getter = Callable[[Any], Any]
 
 
@@ -195,36 +199,93 @@ def _spoken(topics: list[str]) -> dict[str, str]:
 class _Table:
     """The messages of one topic: times, and a row of numbers each."""
 
-    def __init__(self, message: Any, most_elements: int) -> None:
-        self.named = list(_numbers("", message, lambda msg: msg, most_elements))
-        self.times = array("q")
-        self._numbers = array("d")
+    def __init__(self, first: Any, most_elements: int) -> None:
+        """Have a column for each number of the first message."""
+        self.named = list(_numbers("", first, lambda msg: msg, most_elements))
+        self._most_elements = most_elements
+        self._parts: list[tuple[Times, Times, Floats]] = []
+        self._layouts: dict[tuple[Decoder, int], list[Layout | None]] = {}
 
-    def add(self, monotonic_ns: int, message: Any) -> None:
-        self.times.append(monotonic_ns)
-        self._numbers.extend(_number(get, message) for _, get in self.named)
+    @property
+    def fields(self) -> list[str]:
+        """The names of the columns."""
+        return [name for name, _ in self.named]
 
-    def columns(self) -> tuple[npt.NDArray[np.int64], Floats]:
+    def add(self, log_time_ns: int, monotonic_ns: int, message: Any) -> None:
+        """Add one message."""
+        times = (np.array([one], np.int64) for one in (log_time_ns, monotonic_ns))
+        self._parts.append((*times, np.array([self._row(message)], np.float64)))
+
+    def extend(self, block: "Payloads") -> None:
+        """Add messages, each as `add` would: those of one layout together, the others one by one.
+
+        Raises:
+            TraceError: one cannot be read.
+
+        """
+        rows = np.full((len(block.data), len(self.named)), np.nan)
+        sizes = np.fromiter(map(len, block.data), np.int64, len(block.data))
+        left = [self._fill(rows, block, np.flatnonzero(sizes == size)) for size in np.unique(sizes)]
+        for index in np.sort(np.concatenate(left)).tolist():
+            rows[index] = self._row(block.decoded(index))
+        self._parts.append((block.log_time_ns, block.monotonic_ns, rows))
+
+    def columns(self) -> tuple[Times, Floats]:
         """Times, (n,), and numbers, (fields, n), by time."""
-        times = np.array(self.times, np.int64)
-        numbers = np.array(self._numbers, np.float64).reshape(len(times), len(self.named))
-        order = np.argsort(times, kind="stable")
+        logged, times, numbers = (np.concatenate(parts) for parts in zip(*self._parts, strict=True))
+        order = np.lexsort((logged, times))
         return times[order], np.ascontiguousarray(numbers[order].T)
+
+    def _row(self, message: Any) -> list[float]:
+        return [_number(get, message) for _, get in self.named]
+
+    def _fill(self, rows: Floats, block: "Payloads", at: Times) -> Times:
+        """Fill the rows of messages of one size; returns those that are left."""
+        size = len(block.data[at[0]])
+        layouts = self._layouts.setdefault((block.decoder, size), [])
+        messages = np.frombuffer(b"".join([block.data[index] for index in at]), np.uint8).reshape(-1, size)
+        odd = []
+        for number in range(_MOST_LAYOUTS):
+            if len(at) < _FEWEST_TOGETHER:
+                break
+            if number == len(layouts):
+                layouts.append(self._layout(block, int(at[0])))
+            layout = layouts[number]
+            same = np.zeros(len(at), np.bool_) if layout is None else layout.matches(messages)
+            if layout is not None and same.any():
+                alike, places = (messages, at) if same.all() else (messages[same], at[same])
+                for index, (name, _) in enumerate(self.named):
+                    column = layout.column(name, alike)
+                    if column is not None:
+                        rows[places, index] = column
+            elif number == len(layouts) - 1:  # made of the first message, and even that one does not fit
+                odd.append(at[:1])
+                same[0] = True
+            at, messages = at[~same], messages[~same]
+        return np.concatenate([*odd, at])
+
+    def _layout(self, block: "Payloads", index: int) -> Layout | None:
+        """The layout of a message, where it tells the same numbers as the message itself."""
+        layout = block.decoder.layout(block.data[index], most_elements=self._most_elements)
+        if layout is None:
+            return None
+        try:
+            expected = self._row(block.decoded(index))
+        except TraceError:
+            return None
+        message = np.frombuffer(block.data[index], np.uint8).reshape(1, -1)
+        columns = [layout.column(name, message) for name in self.fields]
+        found = [np.nan if column is None else float(column[0]) for column in columns]
+        return layout if np.array_equal(expected, found, equal_nan=True) else None
 
 
 def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
-    tables: dict[str, _Table] = {}
     names = names_of_numbers(trace, topics)
-    for message in trace.messages(*topics):
-        topic = message.topic
-        if topic in topics:
-            if topic not in tables:
-                tables[topic] = _Table(message.msg, max(MOST_ELEMENTS, len(names.get(topic, []))))
-            tables[topic].add(message.monotonic_ns, message.msg)
+    most = {topic: max(MOST_ELEMENTS, len(names.get(topic, []))) for topic in topics}
     found: dict[Field, Samples] = {}
-    for topic, table in tables.items():
+    for topic, table in _tables(trace, most).items():
         times, columns = table.columns()
-        fields = [name for name, _ in table.named]
+        fields = table.fields
         given = names.get(topic, [])
         if len(given) == len(fields):
             fields = given
@@ -232,6 +293,42 @@ def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
             Field(topic, name): Samples(times, column) for name, column in zip(fields, columns, strict=True)
         }
     return found
+
+
+def _tables(trace: "Trace", most: Mapping[str, int]) -> dict[str, _Table]:
+    """Return a table for each topic with messages; `most`: elements of an array that are values, by topic."""
+    if trace.payload_source is not None:
+        return _tables_of_bytes(trace.payload_source, most)
+    tables: dict[str, _Table] = {}
+    for one in trace.messages(*most):
+        if one.topic in most:
+            if one.topic not in tables:
+                tables[one.topic] = _Table(one.msg, most[one.topic])
+            tables[one.topic].add(one.log_time_ns, one.monotonic_ns, one.msg)
+    return tables
+
+
+def _tables_of_bytes(source: "PayloadSource", most: Mapping[str, int]) -> dict[str, _Table]:
+    """As _tables(). The first message by log time tells the columns: where it comes late, all is read again."""
+    firsts: dict[str, tuple[int, Any]] = {}
+    while True:
+        tables: dict[str, _Table] = {}
+        is_whole = True
+        for block in source(tuple(most)):
+            topic = block.topic
+            if topic not in most:
+                continue
+            at = int(np.argmin(block.log_time_ns))
+            log_time_ns = int(block.log_time_ns[at])
+            if topic not in firsts or log_time_ns < firsts[topic][0]:
+                firsts[topic] = (log_time_ns, block.decoded(at))
+            if topic not in tables:
+                tables[topic] = _Table(firsts[topic][1], most[topic])
+            elif firsts[topic][0] == log_time_ns:
+                is_whole &= _Table(firsts[topic][1], most[topic]).fields == tables[topic].fields
+            tables[topic].extend(block)
+        if is_whole:
+            return tables
 
 
 def _number(get: _Getter, message: Any) -> float:
@@ -245,7 +342,7 @@ def _numbers(name: str, value: Any, get: _Getter, most_elements: int) -> Iterato
     """The numeric fields of a message and how to read them; no time stamps, no longer arrays."""
     if dataclasses.is_dataclass(value):
         names = [field.name for field in dataclasses.fields(value)]
-        if tuple(names) == _TIME:
+        if tuple(names) == TIME_FIELDS:
             return
         for one in names:
             path = f"{name}.{one}" if name else one
