@@ -11,12 +11,10 @@ from mauve_rt.trace.bag.mcap_library import Channel, Schema
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.reading.facts import OWN_TYPES, Message
-from mauve_rt.trace.reading.stored_messages import StoredMessages
+from mauve_rt.trace.reading.stored_messages import PackedData, StoredMessages
 
 _DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
-_WAITING_BYTES = 16 << 20
-_Key = tuple[str, str, Decoder]  # topic, type
-_OBJECT_BYTES = 100  # what a message costs besides its own bytes, about
+_LATEST = np.iinfo(np.int64).max
 
 
 class MessageTypes:
@@ -68,7 +66,7 @@ class Payloads(NamedTuple):
     log_time_ns: npt.NDArray[np.int64]
     """CLOCK_REALTIME"""
     monotonic_ns: npt.NDArray[np.int64]
-    data: list[bytes]
+    data: PackedData
 
     def decoded(self, index: int) -> Any:
         """Return one of them as an object.
@@ -78,7 +76,7 @@ class Payloads(NamedTuple):
 
         """
         try:
-            return self.decoder.decode(self.data[index])
+            return self.decoder.decode(self.data.one(index))
         except ValueError as error:
             raise _unreadable(self.topic, self.type_name, error) from error
 
@@ -114,24 +112,23 @@ def messages(
 def payloads(
     files: Sequence[StoredMessages], topics: tuple[str, ...], pairs: npt.NDArray[np.int64]
 ) -> Iterator[Payloads]:
-    """Yield the messages of these topics as bytes; at most some megabytes of them wait.
+    """Yield the messages of these topics as bytes, some megabytes of a file at a time.
 
     Raises:
         TraceError: a file, or the definition of a topic, cannot be read.
 
     """
     types = MessageTypes()
-    waiting: dict[_Key, list[tuple[int, int, bytes]]] = {}
-    waiting_bytes = 0
     for file in files:
-        for channel, schema, log_time_ns, published_ns, data in file.messages(_wanted(topics)):
-            key = (channel.topic, "" if schema is None else schema.name, types.decoder(channel, schema))
-            waiting.setdefault(key, []).append((log_time_ns, published_ns, data))
-            waiting_bytes += len(data) + _OBJECT_BYTES
-            if waiting_bytes > _WAITING_BYTES:
-                yield from _packed(waiting, pairs)
-                waiting, waiting_bytes = {}, 0
-    yield from _packed(waiting, pairs)
+        for channel, schema, logged, published, data in file.blocks(_wanted(topics)):
+            decoder = types.decoder(channel, schema)
+            if max(logged.max(), published.max()) > _LATEST:
+                msg = f"topic {channel.topic}: a message has a time that no clock shows"
+                raise TraceError(msg)
+            log_time_ns, published_ns = logged.astype(np.int64), published.astype(np.int64)
+            monotonic = published_ns - _ahead_ns(published_ns, pairs)
+            type_name = "" if schema is None else schema.name
+            yield Payloads(channel.topic, type_name, decoder, log_time_ns, monotonic, data)
 
 
 def monotonic_ns(published_ns: int, pairs: npt.NDArray[np.int64]) -> int:
@@ -144,20 +141,6 @@ def _wanted(topics: tuple[str, ...]) -> Any:
     if not topics:
         return lambda _, type_name: type_name not in OWN_TYPES
     return lambda topic, type_name: topic in topics or type_name in topics
-
-
-def _packed(
-    waiting: dict[_Key, list[tuple[int, int, bytes]]], pairs: npt.NDArray[np.int64]
-) -> Iterator[Payloads]:
-    for (topic, type_name, decoder), found in waiting.items():
-        logged, published, data = zip(*found, strict=True)
-        try:
-            log_time_ns, published_ns = np.array(logged, np.int64), np.array(published, np.int64)
-        except OverflowError as error:
-            msg = f"topic {topic}: a message has a time that no clock shows"
-            raise TraceError(msg) from error
-        monotonic = published_ns - _ahead_ns(published_ns, pairs)
-        yield Payloads(topic, type_name, decoder, log_time_ns, monotonic, list(data))
 
 
 def _ahead_ns(published_ns: Any, pairs: npt.NDArray[np.int64]) -> Any:

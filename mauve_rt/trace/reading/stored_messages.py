@@ -11,7 +11,10 @@ from collections import Counter
 from collections.abc import Callable, Collection, Iterator
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
 
 from mauve_rt.trace.bag.files import MCAP
 from mauve_rt.trace.bag.mcap_library import Channel, Chunk, McapError, Message, Opcode, Schema, read_record
@@ -23,8 +26,19 @@ from mauve_rt.trace.format.mcap_records import HEAD
 if TYPE_CHECKING:
     from mauve_rt.trace.bag.sqlite_scan import SqliteScan
 
+Integers = npt.NDArray[np.int64]
+
 _RECORD = struct.Struct("<BQHIQQ")  # opcode, length; of a message: channel, sequence, log time, publish time
 _CHUNK, _MESSAGE = int(Opcode.CHUNK), int(Opcode.MESSAGE)
+_MESSAGE_HEAD = np.dtype(
+    [("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
+    + [("log_time_ns", "<u8"), ("published_ns", "<u8")]
+)  # as _RECORD
+_MESSAGE_ROW = np.dtype(
+    [("channel", "<u2"), ("log_time_ns", "<u8"), ("published_ns", "<u8"), ("begin", "<i8"), ("size", "<i8")]
+)
+_BLOCK_BYTES = 16 << 20
+_OBJECT_BYTES = 100  # what a message costs besides its own bytes, about
 _RUN_BYTES = 1 << 20  # messages outside of chunks are read together, about so many bytes at once
 
 
@@ -36,6 +50,37 @@ class StoredMessage(NamedTuple):
     log_time_ns: int
     published_ns: int
     data: bytes
+
+
+class PackedData(NamedTuple):
+    """Payloads of messages, as places in one buffer."""
+
+    buffer: bytes
+    begins: Integers
+    sizes: Integers
+
+    def __len__(self) -> int:
+        """How many there are."""
+        return len(self.begins)
+
+    def one(self, index: int) -> bytes:
+        """Return the bytes of one of them."""
+        begin = int(self.begins[index])
+        return self.buffer[begin : begin + int(self.sizes[index])]
+
+    def together(self, indices: Integers) -> npt.NDArray[np.uint8]:
+        """Return some, all of one size, as an array of a row each."""
+        return _rows_at(self.buffer, self.begins[indices], int(self.sizes[indices[0]]))
+
+
+class MessageBlock(NamedTuple):
+    """Messages of one channel, in the order of the file. Times in ns of CLOCK_REALTIME, without a sign."""
+
+    channel: Channel
+    schema: Schema | None
+    log_time_ns: npt.NDArray[np.uint64]
+    published_ns: npt.NDArray[np.uint64]
+    data: PackedData
 
 
 def scan_of(file: Path) -> "McapScan | SqliteScan":
@@ -84,20 +129,55 @@ class StoredMessages:
             TraceError: the file cannot be read.
 
         """
-        if self._needs_scan:
+        wanted = self._wanted(is_wanted)
+        if wanted is None:
             yield from _scanned(self._path, is_wanted)
             return
+        for data in self._pieces(wanted):
+            at, size = 0, len(data)
+            while at + _RECORD.size <= size:  # a shorter record is no message
+                opcode, length, number, _, log_time_ns, published_ns = _RECORD.unpack_from(data, at)
+                end = at + HEAD.size + length
+                if opcode == _MESSAGE and number in wanted:
+                    payload = data[at + _RECORD.size : end]
+                    yield StoredMessage(*wanted[number], log_time_ns, published_ns, payload)
+                at = end
+
+    def blocks(self, is_wanted: Callable[[str, str], bool]) -> Iterator[MessageBlock]:
+        """Yield the wanted messages in blocks of one channel each, made of some megabytes of the file.
+
+        Raises:
+            TraceError: the file cannot be read.
+
+        """
+        wanted = self._wanted(is_wanted)
+        if wanted is None:
+            yield from _blocks_of(_scanned(self._path, is_wanted))
+            return
+        for data in _joined(self._pieces(wanted)):
+            rows = _message_rows(data)
+            for number in np.unique(rows["channel"]).tolist():
+                if number in wanted:
+                    found = rows[rows["channel"] == number]
+                    yield MessageBlock(
+                        *wanted[number],
+                        found["log_time_ns"],
+                        found["published_ns"],
+                        PackedData(data, found["begin"], found["size"]),
+                    )
+
+    def _wanted(self, is_wanted: Callable[[str, str], bool]) -> dict[int, tuple[Channel, Schema | None]] | None:
+        """Return the channels that are wanted, by number; None where only a pass over the file tells."""
+        if self._needs_scan:
+            return None
         schemas = {number: one for (_, number), one in self._defined.items() if isinstance(one, Schema)}
-        wanted: dict[int, tuple[Channel, Schema | None]] = {}
-        for one in self._defined.values():
-            if isinstance(one, Channel):
-                schema = schemas.get(one.schema_id)
-                if is_wanted(one.topic, "" if schema is None else schema.name):
-                    wanted[one.id] = (one, schema)
-        places = sorted({*chain.from_iterable(self._of_channel.get(number, ()) for number in wanted)})
-        for data in self._pieces(places):
-            for number, log_time_ns, published_ns, payload in _messages_in(data, wanted):
-                yield StoredMessage(*wanted[number], log_time_ns, published_ns, payload)
+        channels = [one for one in self._defined.values() if isinstance(one, Channel)]
+        described = {one.id: (one, schemas.get(one.schema_id)) for one in channels}
+        return {
+            number: (channel, schema)
+            for number, (channel, schema) in described.items()
+            if is_wanted(channel.topic, "" if schema is None else schema.name)
+        }
 
     def _note(self, found: Found, channels: Collection[int]) -> None:
         """Keep where a record of the data section is, and what is in it."""
@@ -119,8 +199,9 @@ class StoredMessages:
             if not places or places[-1] != at:
                 places.append(at)
 
-    def _pieces(self, places: Collection[int]) -> Iterator[bytes]:
-        """Yield the records at these places."""
+    def _pieces(self, channels: Collection[int]) -> Iterator[bytes]:
+        """Yield the parts of the file that hold these channels: records, other channels' too."""
+        places = sorted({*chain.from_iterable(self._of_channel.get(number, ()) for number in channels)})
         if not places:
             return
         limits = McapLimits(f"bag file {self._path}", self._ends[-1][1])
@@ -144,15 +225,67 @@ class StoredMessages:
             raise TraceError(msg) from error
 
 
-def _messages_in(data: bytes, wanted: Collection[int]) -> Iterator[tuple[int, int, int, bytes]]:
-    """Yield channel, times and payload of the wanted messages among records that a first pass has checked."""
+def _joined(pieces: Iterator[bytes]) -> Iterator[bytes]:
+    """Yield several of them as one."""
+    waiting: list[bytes] = []
+    size = 0
+    for piece in pieces:
+        waiting.append(piece)
+        size += len(piece)
+        if size > _BLOCK_BYTES:
+            yield b"".join(waiting)
+            waiting, size = [], 0
+    yield b"".join(waiting)
+
+
+def _message_rows(data: bytes) -> npt.NDArray[Any]:
+    """Return what stands before each message among these records, and where its payload is."""
+    places: list[int] = []
     at, size = 0, len(data)
-    while at + _RECORD.size <= size:  # a shorter record is no message
-        opcode, length, number, _, log_time_ns, published_ns = _RECORD.unpack_from(data, at)
-        end = at + HEAD.size + length
-        if opcode == _MESSAGE and number in wanted:
-            yield number, log_time_ns, published_ns, data[at + _RECORD.size : end]
-        at = end
+    while at + _RECORD.size <= size:
+        opcode, length = HEAD.unpack_from(data, at)
+        if opcode == _MESSAGE:
+            places.append(at)
+        at += HEAD.size + length
+    begins = np.array(places, np.int64)
+    heads = _rows_at(data, begins, _RECORD.size).reshape(-1).view(_MESSAGE_HEAD)
+    rows = np.empty(len(places), _MESSAGE_ROW)
+    for name in ("channel", "log_time_ns", "published_ns"):
+        rows[name] = heads[name]
+    rows["begin"] = begins + _RECORD.size
+    rows["size"] = heads["length"] - np.uint64(_RECORD.size - HEAD.size)
+    return rows
+
+
+def _rows_at(data: bytes, begins: Integers, size: int) -> npt.NDArray[np.uint8]:
+    """Return the `size` bytes from each place on, as an array of a row each."""
+    if not len(begins) or not size:
+        return np.empty((len(begins), size), np.uint8)
+    windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
+    return np.asarray(windows[begins], np.uint8)
+
+
+def _blocks_of(messages: Iterator[StoredMessage]) -> Iterator[MessageBlock]:
+    waiting: dict[tuple[str, int], list[StoredMessage]] = {}
+    size = 0
+    for one in messages:
+        waiting.setdefault((one.channel.topic, one.channel.id), []).append(one)
+        size += len(one.data) + _OBJECT_BYTES
+        if size > _BLOCK_BYTES:
+            yield from map(_block_of, waiting.values())
+            waiting, size = {}, 0
+    yield from map(_block_of, waiting.values())
+
+
+def _block_of(found: list[StoredMessage]) -> MessageBlock:
+    sizes = np.array([len(one.data) for one in found], np.int64)
+    return MessageBlock(
+        found[0].channel,
+        found[0].schema,
+        np.array([one.log_time_ns for one in found], np.uint64),
+        np.array([one.published_ns for one in found], np.uint64),
+        PackedData(b"".join(one.data for one in found), np.cumsum(sizes) - sizes, sizes),
+    )
 
 
 def _scanned(path: Path, is_wanted: Callable[[str, str], bool]) -> Iterator[StoredMessage]:

@@ -224,7 +224,7 @@ class _Table:
 
         """
         rows = np.full((len(block.data), len(self.named)), np.nan)
-        sizes = np.fromiter(map(len, block.data), np.int64, len(block.data))
+        sizes = block.data.sizes
         left = [self._fill(rows, block, np.flatnonzero(sizes == size)) for size in np.unique(sizes)]
         for index in np.sort(np.concatenate(left)).tolist():
             rows[index] = self._row(block.decoded(index))
@@ -241,9 +241,11 @@ class _Table:
 
     def _fill(self, rows: Floats, block: "Payloads", at: Times) -> Times:
         """Fill the rows of messages of one size; returns those that are left."""
-        size = len(block.data[at[0]])
+        if len(at) < _FEWEST_TOGETHER:
+            return at
+        size = int(block.data.sizes[at[0]])
         layouts = self._layouts.setdefault((block.decoder, size), [])
-        messages = np.frombuffer(b"".join([block.data[index] for index in at]), np.uint8).reshape(-1, size)
+        messages = block.data.together(at)
         odd = []
         for number in range(_MOST_LAYOUTS):
             if len(at) < _FEWEST_TOGETHER:
@@ -266,14 +268,14 @@ class _Table:
 
     def _layout(self, block: "Payloads", index: int) -> Layout | None:
         """The layout of a message, where it tells the same numbers as the message itself."""
-        layout = block.decoder.layout(block.data[index], most_elements=self._most_elements)
+        layout = block.decoder.layout(block.data.one(index), most_elements=self._most_elements)
         if layout is None:
             return None
         try:
             expected = self._row(block.decoded(index))
         except TraceError:
             return None
-        message = np.frombuffer(block.data[index], np.uint8).reshape(1, -1)
+        message = block.data.together(np.array([index]))
         columns = [layout.column(name, message) for name in self.fields]
         found = [np.nan if column is None else float(column[0]) for column in columns]
         return layout if np.array_equal(expected, found, equal_nan=True) else None
