@@ -7,6 +7,7 @@ Values of other topics are called by the topic: `/beat.data`.
 import dataclasses
 import difflib
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -15,6 +16,7 @@ import numpy.typing as npt
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.format.message_layout import TIME_FIELDS, Layout
+from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.decisions import DECISION_TYPE
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE
@@ -75,6 +77,11 @@ class Samples(NamedTuple):
         """The values that are finite numbers."""
         return self.values[np.isfinite(self.values)]
 
+    def without_gaps(self) -> "Samples":
+        """Return the samples whose values are finite numbers."""
+        finite = np.isfinite(self.values)
+        return self if finite.all() else Samples(self.monotonic_ns[finite], self.values[finite])
+
     @property
     def nan_share(self) -> float:
         """Share of values that are not finite, 0 to 1."""
@@ -124,7 +131,16 @@ class TraceValues:
     @property
     def samples(self) -> dict[Field, Samples]:
         """All values, those of recorded resources first. Reads all topics."""
-        found = self._samples(self._topics.values())
+        return self.read()
+
+    @cached_property
+    def finite_samples(self) -> dict[Field, Samples]:
+        """As `samples`, without what is not a finite number."""
+        return {field: samples.without_gaps() for field, samples in self.samples.items()}
+
+    def read(self, *, progress: Progress = silent) -> dict[Field, Samples]:
+        """Return `samples`; `progress` is called while topics are read."""
+        found = self._samples(self._topics.values(), progress)
         return dict(sorted(found.items(), key=lambda item: not item[0].of_resource))
 
     @property
@@ -137,11 +153,11 @@ class TraceValues:
         spoken = next((one for one, topic in self._topics.items() if topic == field.topic), field.topic)
         return f"{spoken}.{field.name}"
 
-    def _samples(self, topics: Iterable[str]) -> dict[Field, Samples]:
+    def _samples(self, topics: Iterable[str], progress: Progress = silent) -> dict[Field, Samples]:
         wanted = list(topics)
         new = [topic for topic in wanted if topic not in self._read]
         self._read |= {topic: {} for topic in new}
-        for field, samples in read_samples(self._trace, new, self._problems).items():
+        for field, samples in read_samples(self._trace, new, self._problems, progress).items():
             self._read[field.topic][field] = samples
         return {field: samples for topic in wanted for field, samples in self._read[topic].items()}
 
@@ -171,17 +187,19 @@ def names_of_numbers(trace: "Trace", topics: Iterable[str]) -> dict[str, list[st
     return {one.topic.removesuffix(suffix): list(one.msg.names) for one in messages if one.topic in present}
 
 
-def read_samples(trace: "Trace", topics: list[str], left_out: list[str]) -> dict[Field, Samples]:
+def read_samples(
+    trace: "Trace", topics: list[str], left_out: list[str], progress: Progress = silent
+) -> dict[Field, Samples]:
     """Read all fields of these topics; `left_out` gets a sentence for each topic that is unreadable."""
     if not topics:
         return {}
     try:
-        return _samples(trace, topics)
+        return _samples(trace, topics, progress)
     except TraceError:
         found: dict[Field, Samples] = {}
         for topic in topics:
             try:
-                found |= _samples(trace, [topic])
+                found |= _samples(trace, [topic], progress)
             except TraceError as error:
                 left_out.append(f"{topic} is left out: {error}")
         return found
@@ -281,11 +299,11 @@ class _Table:
         return layout if np.array_equal(expected, found, equal_nan=True) else None
 
 
-def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
+def _samples(trace: "Trace", topics: list[str], progress: Progress) -> dict[Field, Samples]:
     names = names_of_numbers(trace, topics)
     most = {topic: max(MOST_ELEMENTS, len(names.get(topic, []))) for topic in topics}
     found: dict[Field, Samples] = {}
-    for topic, table in _tables(trace, most).items():
+    for topic, table in _tables(trace, most, progress).items():
         times, columns = table.columns()
         fields = table.fields
         given = names.get(topic, [])
@@ -297,10 +315,11 @@ def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
     return found
 
 
-def _tables(trace: "Trace", most: Mapping[str, int]) -> dict[str, _Table]:
+def _tables(trace: "Trace", most: Mapping[str, int], progress: Progress) -> dict[str, _Table]:
     """Return a table for each topic with messages; `most`: elements of an array that are values, by topic."""
     if trace.payload_source is not None:
-        return _tables_of_bytes(trace.payload_source, most)
+        total = sum(trace.topics[topic][1] for topic in most)
+        return _tables_of_bytes(trace.payload_source, most, total, progress)
     tables: dict[str, _Table] = {}
     for one in trace.messages(*most):
         if one.topic in most:
@@ -310,12 +329,15 @@ def _tables(trace: "Trace", most: Mapping[str, int]) -> dict[str, _Table]:
     return tables
 
 
-def _tables_of_bytes(source: "PayloadSource", most: Mapping[str, int]) -> dict[str, _Table]:
+def _tables_of_bytes(
+    source: "PayloadSource", most: Mapping[str, int], total: int, progress: Progress
+) -> dict[str, _Table]:
     """As _tables(). The first message by log time tells the columns: where it comes late, all is read again."""
     firsts: dict[str, tuple[int, Any]] = {}
     while True:
         tables: dict[str, _Table] = {}
         is_whole = True
+        done = 0
         for block in source(tuple(most)):
             topic = block.topic
             if topic not in most:
@@ -329,6 +351,8 @@ def _tables_of_bytes(source: "PayloadSource", most: Mapping[str, int]) -> dict[s
             elif firsts[topic][0] == log_time_ns:
                 is_whole &= _Table(firsts[topic][1], most[topic]).fields == tables[topic].fields
             tables[topic].extend(block)
+            done += len(block.data)
+            progress(min(done / total, 1.0), "reading values")
         if is_whole:
             return tables
 
