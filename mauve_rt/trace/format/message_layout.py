@@ -106,7 +106,7 @@ class _Walk:
         if node == Nodetype.NAME:
             self.message(inner, path, is_named=is_named)
         elif node == Nodetype.ARRAY:
-            self._elements(*inner, path, is_named=is_named)
+            self._elements(inner[0], inner[1], path, is_named=is_named)
         elif node == Nodetype.SEQUENCE:
             self._elements(inner[0], self._length(), path, is_named=is_named)
         elif inner[0] == "string":

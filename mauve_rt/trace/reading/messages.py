@@ -11,7 +11,7 @@ from mauve_rt.trace.bag.mcap_library import Channel, Schema
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.reading.facts import OWN_TYPES, Message
-from mauve_rt.trace.reading.stored_messages import PackedData, StoredMessages
+from mauve_rt.trace.reading.stored_messages import IsWanted, PackedData, StoredMessages
 
 _DISORDER_NS = 2_000_000_000  # messages of a bag are in order of log time but for the queues they waited in
 _LATEST = np.iinfo(np.int64).max
@@ -136,7 +136,7 @@ def monotonic_ns(published_ns: int, pairs: npt.NDArray[np.int64]) -> int:
     return published_ns - int(_ahead_ns(published_ns, pairs))
 
 
-def _wanted(topics: tuple[str, ...]) -> Any:
+def _wanted(topics: tuple[str, ...]) -> IsWanted:
     """All but the trace's own topics where none is named."""
     if not topics:
         return lambda _, type_name: type_name not in OWN_TYPES

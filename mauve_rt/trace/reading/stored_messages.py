@@ -1,14 +1,14 @@
-"""Messages of one file of a bag as bytes, without the parts of the file that hold none of the wanted topics.
+"""Messages of one file of a bag as bytes. A pass leaves out the chunks that hold none of the wanted topics.
 
-The first pass over a file notes which chunk holds which channels. A later pass reads only the chunks it needs:
-a report asks for topics with some ten messages in a file of some hundred megabytes.
+The first pass over a file notes which chunk holds which channels. Later passes read only the chunks that they
+need: a report asks for topics with some ten messages in a file of some hundred megabytes.
 """
 
 import os
 import struct
 from array import array
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,14 +26,18 @@ from mauve_rt.trace.format.mcap_records import HEAD
 if TYPE_CHECKING:
     from mauve_rt.trace.bag.sqlite_scan import SqliteScan
 
+IsWanted = Callable[[str, str], bool]
+"""Of a topic and its type."""
 Integers = npt.NDArray[np.int64]
 
 _RECORD = struct.Struct("<BQHIQQ")  # opcode, length; of a message: channel, sequence, log time, publish time
 _CHUNK, _MESSAGE = int(Opcode.CHUNK), int(Opcode.MESSAGE)
 _MESSAGE_HEAD = np.dtype(
-    [("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4")]
-    + [("log_time_ns", "<u8"), ("published_ns", "<u8")]
-)  # as _RECORD
+    [
+        ("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time_ns", "<u8"),
+        ("published_ns", "<u8"),
+    ]
+)  # as _RECORD; fmt: skip
 _MESSAGE_ROW = np.dtype(
     [("channel", "<u2"), ("log_time_ns", "<u8"), ("published_ns", "<u8"), ("begin", "<i8"), ("size", "<i8")]
 )
@@ -93,7 +97,7 @@ def scan_of(file: Path) -> "McapScan | SqliteScan":
 
 
 class StoredMessages:
-    """What the first pass over a file found, and the later passes. Later passes read no more than the first."""
+    """What the first pass over a file found, and the later passes, which read no more than the first."""
 
     def __init__(self, path: Path) -> None:
         """Know nothing yet."""
@@ -116,13 +120,16 @@ class StoredMessages:
             for found in scan.found():
                 messages = [one for _, one in found.inside if type(one) is Message]
                 counts = Counter([one.channel_id for one in messages])
-                self._note(found, counts)
+                if len(messages) < len(found.inside):
+                    self._define(one for _, one in found.inside if isinstance(one, Schema | Channel))
+                if counts:
+                    self._note(found, counts)
                 yield counts, messages
         else:
             for _, message in scan.messages():
                 yield Counter((message.channel_id,)), [message]
 
-    def messages(self, is_wanted: Callable[[str, str], bool]) -> Iterator[StoredMessage]:
+    def messages(self, is_wanted: IsWanted) -> Iterator[StoredMessage]:
         """Yield the messages whose topic and type are wanted, in the order of the file.
 
         Raises:
@@ -143,7 +150,7 @@ class StoredMessages:
                     yield StoredMessage(*wanted[number], log_time_ns, published_ns, payload)
                 at = end
 
-    def blocks(self, is_wanted: Callable[[str, str], bool]) -> Iterator[MessageBlock]:
+    def blocks(self, is_wanted: IsWanted) -> Iterator[MessageBlock]:
         """Yield the wanted messages in blocks of one channel each, made of some megabytes of the file.
 
         Raises:
@@ -166,7 +173,7 @@ class StoredMessages:
                         PackedData(data, found["begin"], found["size"]),
                     )
 
-    def _wanted(self, is_wanted: Callable[[str, str], bool]) -> dict[int, tuple[Channel, Schema | None]] | None:
+    def _wanted(self, is_wanted: IsWanted) -> dict[int, tuple[Channel, Schema | None]] | None:
         """Return the channels that are wanted, by number; None where only a pass over the file tells."""
         if self._needs_scan:
             return None
@@ -179,14 +186,13 @@ class StoredMessages:
             if is_wanted(channel.topic, "" if schema is None else schema.name)
         }
 
+    def _define(self, definitions: Iterable[Schema | Channel]) -> None:
+        for one in definitions:
+            if self._defined.setdefault((type(one), one.id), one) != one:
+                self._needs_scan = True  # a number with two meanings: only a pass in order knows which
+
     def _note(self, found: Found, channels: Collection[int]) -> None:
-        """Keep where a record of the data section is, and what is in it."""
-        if len(channels) < len(found.inside):
-            for _, one in found.inside:
-                if isinstance(one, Schema | Channel) and self._defined.setdefault((type(one), one.id), one) != one:
-                    self._needs_scan = True  # a number with two meanings: only a pass in order knows which
-        if not channels:
-            return
+        """Keep where a record of the data section is, and whose messages it holds."""
         is_chunk = found.opcode == _CHUNK
         begin, end, was_chunk = self._ends[-1] if self._ends else (0, 0, True)
         if is_chunk or was_chunk or end - begin >= _RUN_BYTES:
@@ -288,7 +294,7 @@ def _block_of(found: list[StoredMessage]) -> MessageBlock:
     )
 
 
-def _scanned(path: Path, is_wanted: Callable[[str, str], bool]) -> Iterator[StoredMessage]:
+def _scanned(path: Path, is_wanted: IsWanted) -> Iterator[StoredMessage]:
     """Yield the wanted messages by a pass over the whole file."""
     with scan_of(path) as scan:
         for channel, message in scan.messages():

@@ -231,8 +231,8 @@ class _Table:
 
     def add(self, log_time_ns: int, monotonic_ns: int, message: Any) -> None:
         """Add one message."""
-        times = (np.array([one], np.int64) for one in (log_time_ns, monotonic_ns))
-        self._parts.append((*times, np.array([self._row(message)], np.float64)))
+        logged, time_ns = np.array([log_time_ns], np.int64), np.array([monotonic_ns], np.int64)
+        self._parts.append((logged, time_ns, np.array([self._row(message)], np.float64)))
 
     def extend(self, block: "Payloads") -> None:
         """Add messages, each as `add` would: those of one layout together, the others one by one.
@@ -332,7 +332,7 @@ def _tables(trace: "Trace", most: Mapping[str, int], progress: Progress) -> dict
 def _tables_of_bytes(
     source: "PayloadSource", most: Mapping[str, int], total: int, progress: Progress
 ) -> dict[str, _Table]:
-    """As _tables(). The first message by log time tells the columns: where it comes late, all is read again."""
+    """As _tables(). The earliest message tells the columns: where it comes late, all is read again."""
     firsts: dict[str, tuple[int, Any]] = {}
     while True:
         tables: dict[str, _Table] = {}
