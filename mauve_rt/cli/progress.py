@@ -13,7 +13,6 @@ from rich.progress import Progress as Bar
 from mauve_rt.cli.plain_output import beneath, plain
 from mauve_rt.trace.progress import Progress, silent
 
-
 SHOWN_AFTER_S = 1.0
 """Shorter work shows no bar."""
 

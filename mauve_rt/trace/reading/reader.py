@@ -91,9 +91,7 @@ class _Content:
         self._kinds: dict[int, RecordKind] = {}
         self._shadows: list[Shadow] = []  # with times of CLOCK_REALTIME
 
-    def add(
-        self, scan: "McapScan | SqliteScan", counts: Mapping[int, int], found: Sequence[Message]
-    ) -> None:
+    def add(self, scan: "McapScan | SqliteScan", counts: Mapping[int, int], found: Sequence[Message]) -> None:
         own: dict[int, tuple[Channel, str]] = {}
         for number, count in counts.items():
             channel = scan.channels[number]

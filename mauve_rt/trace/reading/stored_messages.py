@@ -34,10 +34,14 @@ _RECORD = struct.Struct("<BQHIQQ")  # opcode, length; of a message: channel, seq
 _CHUNK, _MESSAGE = int(Opcode.CHUNK), int(Opcode.MESSAGE)
 _MESSAGE_HEAD = np.dtype(
     [
-        ("opcode", "<u1"), ("length", "<u8"), ("channel", "<u2"), ("sequence", "<u4"), ("log_time_ns", "<u8"),
+        ("opcode", "<u1"),
+        ("length", "<u8"),
+        ("channel", "<u2"),
+        ("sequence", "<u4"),
+        ("log_time_ns", "<u8"),
         ("published_ns", "<u8"),
     ]
-)  # as _RECORD; fmt: skip
+)  # as _RECORD
 _MESSAGE_ROW = np.dtype(
     [("channel", "<u2"), ("log_time_ns", "<u8"), ("published_ns", "<u8"), ("begin", "<i8"), ("size", "<i8")]
 )
@@ -107,9 +111,7 @@ class StoredMessages:
         self._defined: dict[tuple[type, int], Schema | Channel] = {}
         self._needs_scan = path.suffix != MCAP
 
-    def first_pass(
-        self, scan: "McapScan | SqliteScan"
-    ) -> Iterator[tuple[Counter[int], list[Message]]]:
+    def first_pass(self, scan: "McapScan | SqliteScan") -> Iterator[tuple[Counter[int], list[Message]]]:
         """Yield the messages of the file, some at a time, and how many each channel has among them.
 
         Raises:
@@ -300,6 +302,4 @@ def _scanned(path: Path, is_wanted: IsWanted) -> Iterator[StoredMessage]:
         for channel, message in scan.messages():
             if is_wanted(channel.topic, scan.type_of(channel)):
                 schema = scan.schemas.get(channel.schema_id)
-                yield StoredMessage(
-                    channel, schema, message.log_time, message.publish_time, message.data
-                )
+                yield StoredMessage(channel, schema, message.log_time, message.publish_time, message.data)

@@ -66,8 +66,7 @@ def swap_values(analysis: Analysis, one: Reconfiguration) -> list[SwapValue]:
     values = analysis.trace.values
     window = window_around(analysis, one)
     found = [
-        _around(values.name(field), samples, one, window)
-        for field, samples in values.finite_samples.items()
+        _around(values.name(field), samples, one, window) for field, samples in values.finite_samples.items()
     ]
     known = [value for value in found if value.before is not None or value.after is not None]
     if len(known) > MOST_VALUES:

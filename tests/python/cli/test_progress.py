@@ -15,7 +15,6 @@ from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
-
 _END = "<end>"
 
 
@@ -24,7 +23,7 @@ class Terminal:
 
     def __init__(self) -> None:
         self._master, slave = os.openpty()
-        self.stream = open(slave, "w", encoding="utf-8")  # noqa: SIM115 - closed by close()
+        self.stream = os.fdopen(slave, "w", encoding="utf-8")
 
     def text(self) -> str:
         """What was written since the last call."""
@@ -71,7 +70,7 @@ def test_each_verb_shows_how_far_it_is_on_a_terminal_alone(
     out = ["--force"] if verb == "trace export" else []
     assert main([*verb.split(), str(bag), *out]) == 0
     assert "%" in terminal.text()
-    with open(os.devnull, "w", encoding="utf-8") as piped:
+    with Path(os.devnull).open("w", encoding="utf-8") as piped:
         monkeypatch.setattr(sys, "stderr", piped)
         assert main([*verb.split(), str(bag), *out]) == 0
     assert terminal.text() == ""

@@ -1,7 +1,7 @@
 """Values read as columns of bytes: equal to those that the decoder reads message by message."""
 
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +15,7 @@ from rosbags.typesys import Stores, get_typestore
 from mauve_rt.trace import open as open_trace
 from mauve_rt.trace.bag.mcap_file import MAGIC
 from mauve_rt.trace.bag.mcap_library import Channel, DataEnd, Header, Message, Schema, serialized
+from mauve_rt.trace.format.message_decoding import Decoder
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -63,9 +64,7 @@ def odometry(chance: random.Random) -> Any:
     turn = made("geometry_msgs/msg/Twist", linear=vector(), angular=vector())
     covariance = np.arange(36.0)
     with_covariance = made("geometry_msgs/msg/TwistWithCovariance", twist=turn, covariance=covariance)
-    return made(
-        "geometry_msgs/msg/TwistWithCovarianceStamped", header=header(chance), twist=with_covariance
-    )
+    return made("geometry_msgs/msg/TwistWithCovarianceStamped", header=header(chance), twist=with_covariance)
 
 
 def battery(chance: random.Random) -> Any:
@@ -90,12 +89,12 @@ def battery(chance: random.Random) -> Any:
 KINDS = (flag, large, joints, polygon, odometry, battery)
 
 
-def record(folder: Path) -> Path:
-    chance = random.Random(7)
+def record(folder: Path, makers: Sequence[Callable[[random.Random], Any]]) -> Path:
+    """A message by each of these, 1 ms apart; the topic is called by what made it."""
+    chance = random.Random(7)  # noqa: S311
     recorder = Recorder(SyntheticSource(["c"]), folder / "bag", node_name="/executor")
     recorder.start()
-    for number in range(900):
-        make = chance.choice(KINDS)
+    for number, make in enumerate(makers):
         message = make(chance)
         kind = message.__msgtype__
         data = bytes(TYPES.serialize_cdr(message, kind))
@@ -154,7 +153,8 @@ def compressed(bag: Path) -> Path:
 
 @pytest.mark.parametrize("form", [as_recorded, without_chunks, compressed, with_one_number])
 def test_columns_are_what_the_decoder_reads(tmp_path: Path, form: Callable[[Path], Path]) -> None:
-    trace = open_trace(form(record(tmp_path)))
+    makers = random.Random(3).choices(KINDS, k=900)  # noqa: S311
+    trace = open_trace(form(record(tmp_path, makers)))
     found = trace.values
     expected = replace(trace, payload_source=None).values
     assert found.names == expected.names
@@ -164,17 +164,25 @@ def test_columns_are_what_the_decoder_reads(tmp_path: Path, form: Callable[[Path
         np.testing.assert_array_equal(found.samples[field].values, samples.values, strict=True)
 
 
+def test_messages_of_one_layout_are_not_decoded_one_by_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trace = open_trace(record(tmp_path, [flag] * 100))
+    decoded: list[bytes] = []
+    decode = Decoder.decode
+
+    def counted(self: Decoder, data: bytes) -> Any:
+        decoded.append(data)
+        return decode(self, data)
+
+    monkeypatch.setattr(Decoder, "decode", counted)
+    assert len(trace.values["/flag.data"]) == 100
+    assert 0 < len(decoded) < 10
+
+
 def test_a_pass_leaves_out_chunks_without_the_wanted_topic(tmp_path: Path) -> None:
-    recorder = Recorder(SyntheticSource(["c"]), tmp_path / "bag", node_name="/executor")
-    recorder.start()
-    chance = random.Random(1)
-    for number, make in enumerate([flag] * 100 + [large]):
-        message = make(chance)
-        data = bytes(TYPES.serialize_cdr(message, message.__msgtype__))
-        kind = message.__msgtype__
-        assert recorder.record(f"/{make.__name__}", kind, data, monotonic_ns=number * MS)
-    recorder.stop()
-    path = rewritten(tmp_path / "bag", compression=CompressionType.NONE, chunk_size=512)
+    bag = record(tmp_path, [*[flag] * 100, large])
+    path = rewritten(bag, compression=CompressionType.NONE, chunk_size=512)
     trace = open_trace(path)
     damaged = bytearray(path.read_bytes())
     begin = damaged.index(b"/flag")  # in the first chunk that has the topic
