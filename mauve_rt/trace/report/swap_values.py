@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
-from mauve_rt.trace.reading.values import Floats, Samples
+from mauve_rt.trace.reading.value_tables import Floats
+from mauve_rt.trace.reading.values import Samples
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import bullets
