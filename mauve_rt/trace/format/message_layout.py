@@ -31,7 +31,7 @@ _NUMBERS = {
     "int32": "<i4", "uint32": "<u4", "int64": "<i8", "uint64": "<u8", "float32": "<f4", "float64": "<f8",
 }  # fmt: skip
 _FEWEST_NOT_ASCII = 128
-_MOST_PLACES = 1 << 16  # a message with more text takes longer to compare than to read
+_MOST_PLACES = 1 << 16  # characters or messages; more of them take longer to compare than to read
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def layout_of(store: Any, type_name: str, data: bytes, *, most_elements: int) ->
         walk.message(type_name, "", is_named=True)
     except (KeyError, IndexError, struct.error, RecursionError):
         return None  # no whole message, or of a type that this file does not know
-    if walk.at > len(data) or max(len(walk.fixed), len(walk.texts)) > _MOST_PLACES:
+    if walk.at > len(data):
         return None
     fixed = np.array(walk.fixed, np.intp)
     values = np.frombuffer(data, np.uint8)[fixed]
@@ -91,11 +91,13 @@ class _Walk:
         self._store = store
         self._data = data
         self._most = most_elements
+        self._steps = 0
 
     def message(self, type_name: str, path: str, *, is_named: bool) -> None:
         """Pass over the fields of a message."""
-        if self.at > len(self._data):
-            raise IndexError  # many small messages that are not there
+        self._steps += 1
+        if self.at > len(self._data) or self._steps > _MOST_PLACES:
+            raise IndexError  # many small messages, maybe not even there
         fields = self._store.fielddefs[type_name][1]
         is_named = is_named and tuple(name for name, _ in fields) != TIME_FIELDS
         for name, kind in fields:
@@ -132,7 +134,7 @@ class _Walk:
 
     def _text(self) -> None:
         length = self._length()
-        if not length:
+        if not length or length + len(self.texts) > _MOST_PLACES or len(self.fixed) > _MOST_PLACES:
             raise IndexError  # the end of a text counts
         self.texts += range(self.at, self.at + length - 1)
         self.at += length
