@@ -42,7 +42,7 @@ def large(chance: random.Random) -> Any:
 
 
 def joints(chance: random.Random) -> Any:
-    count = chance.choice([0, 2, 2, 2, 3])
+    count = chance.choice([1, 2, 2, 2, 3])
     numbers = {name: np.array([chance.gauss(0, 1) for _ in range(count)]) for name in ("position", "effort")}
     names = [chance.choice(WORDS) for _ in range(count)]
     none = np.empty(0)
