@@ -47,6 +47,7 @@ from recording_kept import kept_rows
 from recording_killed import kill_rows
 from recording_topics import recording_topics_rows
 from reload import reload_rows
+from report_large import report_large_rows
 from rows import Row, markdown, not_available
 from rules import rule_rows
 from safe_stop import safe_stop_rows
@@ -101,6 +102,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "recording-kept": kept_rows,
     "recording-topics": recording_topics_rows,
     "reading": reading_rows,
+    "report-large": report_large_rows,
     "analysis": analysis_rows,
     "proof": proof_rows,
     "mission": mission_rows,

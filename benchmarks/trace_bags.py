@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.format.records import RECORD, Kind, Records
 from mauve_rt.trace.recording.trace_bag import Drained, TraceBag
 
@@ -13,6 +13,7 @@ _NAMES = ["", "Work", "Rest"]
 _PERIOD_NS = 1_000_000
 _CYCLE = (Kind.RELEASE, Kind.STATE_BEGIN, Kind.STATE_END, Kind.WAIT)
 _FLUSH_NS = 100_000_000
+_TYPE, _DEFINITION, _HEAD = "bench_msgs/msg/Pose", "float64 x\nfloat64 y\n", bytes([0, 1, 0, 0])
 _REALTIME_NS = 1_700_000_000_000_000_000
 
 
@@ -26,8 +27,11 @@ class _Words:
         return _NAMES
 
 
-def make_bag(path: Path, records: int) -> Path:
-    """Write a bag of about so many records: 1 kHz, some tens of us of latency, 200 us of work."""
+def make_bag(path: Path, records: int, *, topics: int = 0) -> Path:
+    """Write a bag of about so many records: 1 kHz, some tens of us of latency, 200 us of work.
+
+    Each of the topics has a message of two numbers at each instant.
+    """
     random = np.random.default_rng(1)
     cycles = records // (len(COMPONENTS) * len(_CYCLE))
     per_flush = _FLUSH_NS // _PERIOD_NS
@@ -41,7 +45,12 @@ def make_bag(path: Path, records: int) -> Path:
         counts = [written] * len(COMPONENTS)
         data = b"".join(part.tobytes() for part in parts)
         none = [0] * len(COMPONENTS)
-        bag.write(Drained(data, counts, none, now_ns, now_ns + _REALTIME_NS), [], whole=True)
+        messages = [
+            SentMessage(f"/pose_{topic}", _TYPE, _HEAD + two.tobytes(), int(instant_ns), None, _DEFINITION)
+            for topic in range(topics)
+            for instant_ns, two in zip(instants, random.normal(size=(len(instants), 2)), strict=True)
+        ]
+        bag.write(Drained(data, counts, none, now_ns, now_ns + _REALTIME_NS), messages, whole=True)
         bag.flush()
     bag.close()
     return path

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from mauve_rt.trace.errors import libraries_missing
+from mauve_rt.trace.format.message_layout import Layout, layout_of
 
 try:
     from rosbags.interfaces import Nodetype
@@ -42,7 +43,8 @@ class Decoder:
             self._store: Any = get_typestore(Stores.EMPTY)
             self._store.register(types)
             self._store.types |= {name: self._plain(name) for name in types}
-            self._type = self._store.get_msgdef(next(iter(types)))
+            self.type_name = next(iter(types))
+            self._type = self._store.get_msgdef(self.type_name)
         except (MemoryError, ValueError):
             raise
         except KeyError as error:
@@ -60,6 +62,10 @@ class Decoder:
         count = len(self._store.fielddefs[name][1])
         names = [one.name for one in dataclasses.fields(self._store.types[name])[:count]]
         return dataclasses.make_dataclass(name.rpartition("/")[2], names)
+
+    def layout(self, data: bytes, *, most_elements: int) -> Layout | None:
+        """Return where the numbers of a message are; None where it cannot be told."""
+        return layout_of(self._store, self.type_name, data, most_elements=most_elements)
 
     def decode(self, data: bytes) -> Any:
         """Return a message.

@@ -4,6 +4,7 @@ import heapq
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -26,6 +27,7 @@ from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
+    from mauve_rt.trace.reading.messages import PayloadSource
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
     from mauve_rt.trace.recording.trace_bag import Entry
@@ -64,6 +66,8 @@ class Trace:
     """Of the executor's rules, by time; empty when it ran none."""
     shadow_reports: tuple[Shadow, ...] = ()
     """Of each shadow one report a second, and one after its end; in the order of the bag."""
+    payload_source: "PayloadSource | None" = field(repr=False, default=None)
+    """Messages of these topics as bytes; None of a trace made by hand, which has objects only."""
 
     @property
     def components(self) -> tuple[str, ...]:
@@ -213,7 +217,16 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
             for key, trace in traces.items()
             for one in trace.shadow_reports
         ),
+        payload_source=_all_payloads(traces.values()),
     )
+
+
+def _all_payloads(traces: Iterable[Trace]) -> "PayloadSource | None":
+    sources = [trace.payload_source for trace in traces]
+    known = [source for source in sources if source is not None]
+    if len(known) < len(sources):
+        return None
+    return lambda topics: chain.from_iterable(source(topics) for source in known)
 
 
 def _all_decisions(traces: Mapping[str, Trace]) -> tuple[TracedDecision, ...]:

@@ -4,26 +4,25 @@ A topic `.../values/NAME` holds the values of the resource NAME. They are called
 Values of other topics are called by the topic: `/beat.data`.
 """
 
-import dataclasses
 import difflib
-from array import array
-from collections.abc import Callable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterable, Iterator
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mauve_rt.trace.errors import TraceError
+from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.decisions import DECISION_TYPE
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE
+from mauve_rt.trace.reading.value_tables import Floats, tables_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from mauve_rt.trace.reading.trace import Trace
-
-Floats = npt.NDArray[np.float64]
 
 MOST_ELEMENTS = 16
 """Of an array whose elements are values; a longer one, as a laser scan, is left out."""
@@ -41,8 +40,6 @@ NO_VALUES = (
 )
 """Types of messages that report on the executor and its computer."""
 _RESOURCES = "/values/"
-_TIME = ("sec", "nanosec")
-_Getter = Callable[[Any], Any]
 
 
 class Field(NamedTuple):
@@ -70,6 +67,11 @@ class Samples(NamedTuple):
     def finite(self) -> Floats:
         """The values that are finite numbers."""
         return self.values[np.isfinite(self.values)]
+
+    def without_gaps(self) -> "Samples":
+        """Return the samples whose values are finite numbers."""
+        finite = np.isfinite(self.values)
+        return self if finite.all() else Samples(self.monotonic_ns[finite], self.values[finite])
 
     @property
     def nan_share(self) -> float:
@@ -120,7 +122,16 @@ class TraceValues:
     @property
     def samples(self) -> dict[Field, Samples]:
         """All values, those of recorded resources first. Reads all topics."""
-        found = self._samples(self._topics.values())
+        return self.read()
+
+    @cached_property
+    def finite_samples(self) -> dict[Field, Samples]:
+        """As `samples`, without what is not a finite number."""
+        return {field: samples.without_gaps() for field, samples in self.samples.items()}
+
+    def read(self, *, progress: Progress = silent) -> dict[Field, Samples]:
+        """Return `samples`; `progress` is called while topics are read."""
+        found = self._samples(self._topics.values(), progress)
         return dict(sorted(found.items(), key=lambda item: not item[0].of_resource))
 
     @property
@@ -133,11 +144,11 @@ class TraceValues:
         spoken = next((one for one, topic in self._topics.items() if topic == field.topic), field.topic)
         return f"{spoken}.{field.name}"
 
-    def _samples(self, topics: Iterable[str]) -> dict[Field, Samples]:
+    def _samples(self, topics: Iterable[str], progress: Progress = silent) -> dict[Field, Samples]:
         wanted = list(topics)
         new = [topic for topic in wanted if topic not in self._read]
         self._read |= {topic: {} for topic in new}
-        for field, samples in read_samples(self._trace, new, self._problems).items():
+        for field, samples in read_samples(self._trace, new, self._problems, progress).items():
             self._read[field.topic][field] = samples
         return {field: samples for topic in wanted for field, samples in self._read[topic].items()}
 
@@ -167,17 +178,19 @@ def names_of_numbers(trace: "Trace", topics: Iterable[str]) -> dict[str, list[st
     return {one.topic.removesuffix(suffix): list(one.msg.names) for one in messages if one.topic in present}
 
 
-def read_samples(trace: "Trace", topics: list[str], left_out: list[str]) -> dict[Field, Samples]:
+def read_samples(
+    trace: "Trace", topics: list[str], left_out: list[str], progress: Progress = silent
+) -> dict[Field, Samples]:
     """Read all fields of these topics; `left_out` gets a sentence for each topic that is unreadable."""
     if not topics:
         return {}
     try:
-        return _samples(trace, topics)
+        return _samples(trace, topics, progress)
     except TraceError:
         found: dict[Field, Samples] = {}
         for topic in topics:
             try:
-                found |= _samples(trace, [topic])
+                found |= _samples(trace, [topic], progress)
             except TraceError as error:
                 left_out.append(f"{topic} is left out: {error}")
         return found
@@ -192,39 +205,13 @@ def _spoken(topics: list[str]) -> dict[str, str]:
     }
 
 
-class _Table:
-    """The messages of one topic: times, and a row of numbers each."""
-
-    def __init__(self, message: Any, most_elements: int) -> None:
-        self.named = list(_numbers("", message, lambda msg: msg, most_elements))
-        self.times = array("q")
-        self._numbers = array("d")
-
-    def add(self, monotonic_ns: int, message: Any) -> None:
-        self.times.append(monotonic_ns)
-        self._numbers.extend(_number(get, message) for _, get in self.named)
-
-    def columns(self) -> tuple[npt.NDArray[np.int64], Floats]:
-        """Times, (n,), and numbers, (fields, n), by time."""
-        times = np.array(self.times, np.int64)
-        numbers = np.array(self._numbers, np.float64).reshape(len(times), len(self.named))
-        order = np.argsort(times, kind="stable")
-        return times[order], np.ascontiguousarray(numbers[order].T)
-
-
-def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
-    tables: dict[str, _Table] = {}
+def _samples(trace: "Trace", topics: list[str], progress: Progress) -> dict[Field, Samples]:
     names = names_of_numbers(trace, topics)
-    for message in trace.messages(*topics):
-        topic = message.topic
-        if topic in topics:
-            if topic not in tables:
-                tables[topic] = _Table(message.msg, max(MOST_ELEMENTS, len(names.get(topic, []))))
-            tables[topic].add(message.monotonic_ns, message.msg)
+    most = {topic: max(MOST_ELEMENTS, len(names.get(topic, []))) for topic in topics}
     found: dict[Field, Samples] = {}
-    for topic, table in tables.items():
+    for topic, table in tables_of(trace, most, progress).items():
         times, columns = table.columns()
-        fields = [name for name, _ in table.named]
+        fields = table.fields
         given = names.get(topic, [])
         if len(given) == len(fields):
             fields = given
@@ -232,34 +219,3 @@ def _samples(trace: "Trace", topics: list[str]) -> dict[Field, Samples]:
             Field(topic, name): Samples(times, column) for name, column in zip(fields, columns, strict=True)
         }
     return found
-
-
-def _number(get: _Getter, message: Any) -> float:
-    try:
-        return float(get(message))
-    except (IndexError, TypeError, OverflowError):  # a sequence that is shorter than in the first message
-        return float("nan")
-
-
-def _numbers(name: str, value: Any, get: _Getter, most_elements: int) -> Iterator[tuple[str, _Getter]]:
-    """The numeric fields of a message and how to read them; no time stamps, no longer arrays."""
-    if dataclasses.is_dataclass(value):
-        names = [field.name for field in dataclasses.fields(value)]
-        if tuple(names) == _TIME:
-            return
-        for one in names:
-            path = f"{name}.{one}" if name else one
-            yield from _numbers(path, getattr(value, one), _attribute(get, one), most_elements)
-    elif isinstance(value, np.ndarray | list | tuple):
-        for index, element in enumerate(value if len(value) <= most_elements else ()):
-            yield from _numbers(f"{name}[{index}]", element, _item(get, index), most_elements)
-    elif isinstance(value, bool | int | float | np.number | np.bool_):
-        yield name, get
-
-
-def _attribute(get: _Getter, name: str) -> _Getter:
-    return lambda message: getattr(get(message), name)
-
-
-def _item(get: _Getter, index: int) -> _Getter:
-    return lambda message: get(message)[index]

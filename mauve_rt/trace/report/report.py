@@ -29,7 +29,7 @@ from mauve_rt.trace.report.verdict import Verdict, judge, verdict_html
 
 _EVENT_TYPE = "mauve_msgs/msg/ReconfigurationEvent"
 _STATE_TYPE = "mauve_msgs/msg/ArchitectureState"
-_ANALYSED, _PACKED = 0.5, 0.7
+_ANALYSED, _VALUES_READ, _PACKED = 0.2, 0.7, 0.8
 
 
 def write_report(
@@ -73,7 +73,8 @@ def write_report(
         zero_ns=zero_ns,
         progress=part(progress, 0, _ANALYSED),
     )
-    progress(_ANALYSED, "packing the timeline")
+    trace.values.read(progress=part(progress, _ANALYSED, _VALUES_READ))
+    progress(_VALUES_READ, "packing the timeline")
     described, data = timeline_data(analysis, budget=budget)
     makers: tuple[Callable[[Analysis], Section | None], ...] = (
         reconfigurations_section,

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
-from mauve_rt.trace.reading.values import Floats, Samples
+from mauve_rt.trace.reading.value_tables import Floats
+from mauve_rt.trace.reading.values import Samples
 from mauve_rt.trace.report import svg
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import bullets
@@ -65,7 +66,9 @@ def swap_values(analysis: Analysis, one: Reconfiguration) -> list[SwapValue]:
     """Return the values that change most over a swap, relative to their steps before it."""
     values = analysis.trace.values
     window = window_around(analysis, one)
-    found = [_around(values.name(field), samples, one, window) for field, samples in values.samples.items()]
+    found = [
+        _around(values.name(field), samples, one, window) for field, samples in values.finite_samples.items()
+    ]
     known = [value for value in found if value.before is not None or value.after is not None]
     if len(known) > MOST_VALUES:
         known = sorted(known, key=lambda value: -value.rank)[:MOST_VALUES]
@@ -94,8 +97,7 @@ def values_around_swap(analysis: Analysis, one: Reconfiguration) -> tuple[str, s
 
 
 def _around(name: str, samples: Samples, one: Reconfiguration, window: Window) -> SwapValue:
-    finite = np.isfinite(samples.values)
-    times, values = samples.monotonic_ns[finite], samples.values[finite]
+    times, values = samples
     parked, armed = np.searchsorted(times, (one.parked_ns, max(one.armed_ns, one.parked_ns + 1))).tolist()
     before = float(values[parked - 1]) if parked else None
     after = float(values[armed]) if armed < len(values) else None

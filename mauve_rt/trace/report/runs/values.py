@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.reading.values import Field, Floats, Samples, read_samples, value_topics
+from mauve_rt.trace.reading.value_tables import Floats
+from mauve_rt.trace.reading.values import Field, Samples, read_samples, value_topics
 from mauve_rt.trace.report.runs.noise import block_count, moment_changes
 from mauve_rt.trace.report.runs.timing import TOO_SHORT, Figure
 
