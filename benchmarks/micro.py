@@ -14,6 +14,7 @@ _NS_PER_US = 1000
 _PACE_NS = 1000
 _RELEASES = ("plain", "shadowed", "waking", "probation")
 _SHADOW_US = 5.0  # 0.5 % of the period; most of it is the system call that wakes the shadow's thread
+_LOOKUP_NS_PER_HOP = 1000
 _ONE_CPU = "this machine has one CPU"
 _COPY = "PI mutex lock + unlock + copy"
 
@@ -109,6 +110,17 @@ def latest_value_rows(settings: Settings) -> Iterator[Row]:
     bad = [found["failed"] + found["torn"] for found in rounds]
     note = f"of {sum(found['reads'] for found in rounds)} reads against either writer"
     yield exactly_zero(f"{what}: reads that failed or found halves of two values", bad, note=note)
+
+
+def transform_lookup_rows(settings: Settings) -> Iterator[Row]:
+    """Look up transforms of a TransformTree."""
+    rounds = _rounds("bench_transform_lookup", settings)
+    for hops, plural in ((1, ""), (10, "s")):
+        pairs = _block_pairs(rounds, f"lookup_{hops}", f"map_{hops}")
+        what = f"TransformTree lookup by names, interpolated, {hops} hop{plural}"
+        beside, limit = "two std::map lookups by name", hops * _LOOKUP_NS_PER_HOP
+        yield compared(what, pairs, unit="ns", beside=beside, limit=limit)
+    yield exactly_zero("TransformTree: lookups that failed", [found["failed"] for found in rounds])
 
 
 def activation_rows(settings: Settings) -> Iterator[Row]:

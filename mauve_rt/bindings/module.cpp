@@ -17,6 +17,8 @@ Attributes:
     KEPT: Source of overlays of rules that were active before a restart, and that the rules file lacks.
     HELD_STOPPED: Source of overlays that keep components stopped after a restart.
     STOP_TIMEOUT_NS: How long a state may go on after a stop of all components, before its component is given up.
+    TRANSFORM_OUTCOMES: The outcomes of a set or lookup of a transform in words, by the numbers of
+        mauve_msgs/msg/TransformOutcome.
     TASK_SETTINGS: What add_component() takes by keyword, besides `states`.
 )";
   bind_errors(module);
@@ -35,6 +37,7 @@ Attributes:
   bind_architecture(module);
   bind_state_keeper(module);
   bind_value_log(module);
+  bind_transforms(module);
   bind_host(module);
   bind_simulation(module);
   bind_rules(module);

@@ -81,6 +81,7 @@ class ShellView {
   ReadMessage read(const std::string& name) const;
   bool write(const std::string& name, const py::bytes& data) const;
   py::object call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const;
+  py::bytes request(const std::string& name, const py::bytes& data) const;
   void raise_event(const std::string& name) const;
   py::object property(const std::string& name) const;
   Duration times(std::int64_t factor, const std::string& property) const;

@@ -411,6 +411,12 @@ class ResourceModel(Section):
         told: Mapping[str, Any] = vars(self)["_parameters"]
         return told
 
+    def parameter(self, name: str) -> Any:
+        """The parameter of a given kind, or its initial value; None: the kind has no such parameter."""
+        kind = given_kinds().get(self.kind)
+        initial = {each.name: each.initial for each in kind.parameters} if kind is not None else {}
+        return self.parameters.get(name, initial.get(name))
+
     @property
     def topic_type(self) -> str:
         """The message type of its topic."""

@@ -18,6 +18,7 @@ __all__ = [
     "Resource",
     "RingBuffer",
     "SharedData",
+    "TransformTree",
     "parameter",
     "read_resource",
     "service",
@@ -224,6 +225,17 @@ class EventCounter(DataOfKind[int]):
 
     def __init__(self) -> None:
         super().__init__("event", "")
+
+
+class TransformTree(DataOfKind[Any]):
+    """The frames of a robot: at most `frames` (64), with the latest `history` (256) transforms of each.
+
+    Its services `set` and `lookup` are called by `request_port(SetTransform)` and
+    `request_port(LookupTransform)`, of `mauve_msgs.srv`.
+    """
+
+    def __init__(self, *, frames: int | None = None, history: int | None = None) -> None:
+        super().__init__("transform_tree", "", **_told(frames=frames, history=history))
 
 
 def _capacities(capacities: Mapping[str, int] | None) -> dict[str, int]:

@@ -26,8 +26,9 @@ using mauve::bindings::Typed;
 
 template <std::size_t (Bridge::*open)(const TopicSettings&)>
 std::size_t open_topic(Bridge& self, const std::string& resource, const std::string& topic,
-                       const std::string& type, const rmw_qos_profile_t& qos) {
-  return (self.*open)({.resource = resource, .name = topic, .type = type, .qos = qos});
+                       const std::string& type, const rmw_qos_profile_t& qos, bool is_static) {
+  return (self.*
+          open)({.resource = resource, .name = topic, .type = type, .qos = qos, .is_static = is_static});
 }
 
 /// From (name, type, "" | "fixed" | "sequence", size, fields).
@@ -330,13 +331,16 @@ What is opened can be found on the network; it serves its resource from attach()
 
 Priority (SCHED_FIFO) and CPUs (none: any) are the sending thread's.)")
       .def("publish", &open_topic<&Bridge::publish>, py::arg("resource"), py::arg("topic"), py::arg("type"),
-           py::arg("qos"), Unlocked(),
+           py::arg("qos"), py::kw_only(), py::arg("is_static") = false, Unlocked(),
            R"(Open a topic for a resource; returns the number of what was opened, also in the log.
+
+`is_static`: for the static transforms of a transform_tree.
 
 Raises:
     MauveError: the type is not installed, or the middleware refuses; nothing is open then.)")
       .def("subscribe", &open_topic<&Bridge::subscribe>, py::arg("resource"), py::arg("topic"),
-           py::arg("type"), py::arg("qos"), Unlocked(), "As publish(), the other way.")
+           py::arg("type"), py::arg("qos"), py::kw_only(), py::arg("is_static") = false, Unlocked(),
+           "As publish(), the other way.")
       .def("mirror", &open_mirror, py::arg("resource"), py::arg("topic"), py::arg("type"), py::arg("qos"),
            py::kw_only(), py::arg("period_ns"), py::arg("numbers") = std::nullopt,
            py::arg("number") = std::nullopt, Unlocked(),

@@ -148,7 +148,7 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   void set_longest_hold_ns(time_ns_t longest_hold_ns);
 
   /// Notified of writes and calls, for those who carry them outside; `of_stops`: of the writes of a stop, too. [setup]
-  void set_notifier(Notifier* notifier, Notifier* of_stops = nullptr) noexcept {
+  virtual void set_notifier(Notifier* notifier, Notifier* of_stops = nullptr) noexcept {
     notifier_ = notifier;
     stop_notifier_ = of_stops;
   }
@@ -237,6 +237,9 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   virtual std::optional<NumberPlace> find_number(std::string_view /*path*/) const { return {}; }
   /// That number in the newest value; false when there is none yet. [rt]
   virtual bool read_number(const NumberPlace& /*place*/, double& /*number*/) MAUVE_RT { return false; }
+
+  /// Its values that are always valid, for a topic of their own; nullptr: there are none. It lives as long. [non-rt]
+  virtual Resource* static_side() noexcept { return nullptr; }
 
   /// What it is seen from those who carry its calls; nullptr: no client. [rt]
   virtual ClientBase* client() MAUVE_RT { return nullptr; }
