@@ -68,7 +68,7 @@ def _first_sentence(kind: str) -> str:
 def _key(name: str) -> tuple[str, str]:
     from _reference.python_api import below  # noqa: PLC0415
 
-    module, nodes = find("mauve_rt.trace.recording.trace_bag", name)
+    module, nodes = find("mauve_rt.trace.recording.ledger", name)
     [node] = nodes
     assert isinstance(node, ast.Assign)  # noqa: S101 - a constant
     meaning = below(module, nodes).removeprefix("Key in the custom data of metadata.yaml: ")
@@ -76,7 +76,7 @@ def _key(name: str) -> tuple[str, str]:
 
 
 def _ledger() -> list[tuple[str, str]]:
-    [entry] = find("mauve_rt.trace.recording.trace_bag", "Entry")[1]
+    [entry] = find("mauve_rt.trace.recording.ledger", "Entry")[1]
     assert isinstance(entry, ast.ClassDef)  # noqa: S101
     rows = []
     for field, text in zip(entry.body, entry.body[1:], strict=False):

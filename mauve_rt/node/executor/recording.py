@@ -28,8 +28,8 @@ from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
+    from mauve_rt.trace.recording.ledger import Entry
     from mauve_rt.trace.recording.recorder import MessageSource, Recorder
-    from mauve_rt.trace.recording.trace_bag import Entry
 
 _BEST_EFFORT = "best_effort"
 

@@ -16,13 +16,7 @@ from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import (
-    DROPPED_MESSAGES,
-    INTERRUPTIONS,
-    Entry,
-    Interruption,
-    ledger_of,
-)
+from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, INTERRUPTIONS, Entry, Interruption, ledger_of
 
 
 @dataclass(frozen=True)

@@ -29,7 +29,7 @@ from mauve_rt.trace.reading.decisions import RULES, traced_decisions
 from mauve_rt.trace.reading.facts import OWN_TYPES, BagFile, Deployment, Loss, Message
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE, Shadow
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import Entry, ledger_of
+from mauve_rt.trace.recording.ledger import Entry, ledger_of
 
 if TYPE_CHECKING:
     from mauve_rt.trace.bag.sqlite_scan import SqliteScan

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from mauve_rt.trace.reading.frames import Frames
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
-    from mauve_rt.trace.recording.trace_bag import Entry
+    from mauve_rt.trace.recording.ledger import Entry
 
 _CLOCK_STEP_NS = 500_000_000  # a clock that is slewed gains at most 0.5 ms in a second
 _SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this

@@ -10,18 +10,10 @@ from pathlib import Path
 from mauve_rt.trace.bag.disk import KeptDisk
 from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage, Split, TopicQos
 from mauve_rt.trace.errors import DiskError, TraceError
+from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, Entry
+from mauve_rt.trace.recording.sources import Drain, MessageSource, TopicSource, TraceSource
 from mauve_rt.trace.recording.tap import Tap
-from mauve_rt.trace.recording.trace_bag import (
-    BATCHES,
-    DROPPED_MESSAGES,
-    NAMES,
-    Drain,
-    Entry,
-    MessageSource,
-    TopicSource,
-    TraceBag,
-    TraceSource,
-)
+from mauve_rt.trace.recording.trace_bag import BATCHES, NAMES, TraceBag
 
 __all__ = [
     "BATCHES",

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage
-from mauve_rt.trace.recording.trace_bag import Drain, Drained, MessageSource, TopicSource, TraceSource
+from mauve_rt.trace.recording.sources import Drain, Drained, MessageSource, TopicSource, TraceSource
 
 
 class Taken(NamedTuple):

@@ -6,24 +6,18 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
 
 from mauve_rt.trace.bag.disk import Disk
 from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
+from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry, Interruption
+from mauve_rt.trace.recording.sources import Drain, TraceWords
 
 BATCHES = "trace/batches"
 NAMES = "trace/names"
 ARCHITECTURE = "trace/architecture"
-DROPPED_MESSAGES = "mauve_dropped_messages"
-"""Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
-LEDGER = "mauve_topics"
-"""Key in the custom data of metadata.yaml: a JSON object of each topic's Entry. What is in the bag of it is
-`received - lost + repeated` messages."""
-INTERRUPTIONS = "mauve_interruptions"
-"""Key in the custom data of metadata.yaml: a JSON list of each Interruption."""
 _MOST_INTERRUPTIONS, _LONGEST_REASON = 16, 400
 _RECORD_BYTES = 48
 _KEPT_MESSAGES, _KEPT_BYTES = 16, 8 * 1024 * 1024  # of a latched topic of others, for the files to come
@@ -31,143 +25,6 @@ _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
 _ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
 _LATCHED = TopicQos(depth=1, transient_local=True)
-
-
-class Drain(Protocol):
-    """What one drain of the kernel's rings yields (`mauve_rt._kernel.TraceDrain`)."""
-
-    @property
-    def records(self) -> bytes:
-        """Records, 48 bytes each."""
-
-    @property
-    def written(self) -> list[int]:
-        """Per component: records ever offered."""
-
-    @property
-    def dropped(self) -> list[int]:
-        """Per component: of these, lost because the ring was full."""
-
-    @property
-    def monotonic_ns(self) -> int:
-        """Time of the drain, CLOCK_MONOTONIC."""
-
-    @property
-    def realtime_ns(self) -> int:
-        """The same instant, CLOCK_REALTIME."""
-
-
-class Drained(NamedTuple):
-    """A drain as a value."""
-
-    records: bytes
-    written: list[int]
-    dropped: list[int]
-    monotonic_ns: int
-    realtime_ns: int
-
-
-class TraceWords(Protocol):
-    """What the numbers in records stand for; all that a bag asks for itself."""
-
-    def trace_components(self) -> list[str]:
-        """Words that `component` of a record refers to."""
-
-    def trace_names(self) -> list[str]:
-        """Words that `name` of a record refers to."""
-
-
-class TraceSource(TraceWords, Protocol):
-    """The part of `mauve_rt._kernel.Host` that the recorder uses."""
-
-    def collect_trace(self, period_ns: int) -> None:
-        """Empty the rings so often, by a thread without the interpreter, for drain_trace(); 0: no longer."""
-
-    def drain_trace(self) -> Drain:
-        """Take everything out of the rings, and what was collected."""
-
-
-class Entry(NamedTuple):
-    """One topic in the ledger of a bag."""
-
-    received: int = 0
-    """Messages that came and were to be recorded."""
-    lost: int = 0
-    """Of these, not in the bag."""
-    repeated: int = 0
-    """Messages of a latched topic that later files begin with, as well."""
-    lost_before: int = 0
-    """Of a topic of other nodes: messages that were sent and did not come, as far as that is known."""
-    numbered: bool | None = None
-    """Of a topic of other nodes: whether its messages are numbered, so that gaps are known. Else null."""
-
-    @property
-    def recorded(self) -> int:
-        """What the bag has of it."""
-        return self.received - self.lost + self.repeated
-
-    def plus(self, other: "Entry") -> "Entry":
-        """Return both together: of a topic that is recorded twice, in one bag or in several."""
-        known = {self.numbered, other.numbered} - {None}
-        return Entry(
-            self.received + other.received,
-            self.lost + other.lost,
-            self.repeated + other.repeated,
-            self.lost_before + other.lost_before,
-            all(known) if known else None,
-        )
-
-
-def ledger_of(custom_data: Mapping[str, str]) -> dict[str, Entry]:
-    """Return what the custom data of a bag tells of each topic; nothing in a bag of an earlier version."""
-    try:
-        told = json.loads(custom_data.get(LEDGER, "{}"))
-        return {topic: Entry(**fields) for topic, fields in told.items()}
-    except (ValueError, TypeError, AttributeError):  # somebody else wrote it
-        return {}
-
-
-class TopicSource(Protocol):
-    """Topics of other nodes, received elsewhere."""
-
-    @property
-    def topics(self) -> Sequence[ReceivedTopic]:
-        """In the order of their numbers."""
-
-    @property
-    def numbered(self) -> bool:
-        """Whether gaps in what a writer sent are known."""
-
-    def take(self) -> ReceivedBatch:
-        """What came since the last call."""
-
-    def stop(self) -> None:
-        """Receive no longer; the last messages stay for take(). May be called again."""
-
-
-class Interruption(NamedTuple):
-    """A time in which nothing got into the bag."""
-
-    reason: str
-    from_ns: int
-    """CLOCK_REALTIME."""
-    until_ns: int = 0
-    """0: the bag ends with it."""
-    records: int = 0
-    """Trace records that are not in the bag; messages are in the ledger."""
-
-
-class MessageSource(Protocol):
-    """Messages kept elsewhere until the recorder takes them."""
-
-    def keep_messages(self, *, on: bool) -> None:
-        """Keep them from now on, or no longer."""
-
-    def take_messages(self) -> Sequence[SentMessage]:
-        """What was sent or received since the last call."""
-
-    def dropped_messages(self) -> int:
-        """Messages that found no room to wait, ever."""
 
 
 class TraceBag:

@@ -5,7 +5,7 @@ from html import escape
 from mauve_rt.trace.reading.architecture import ComponentInfo
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.statistics import Distribution
-from mauve_rt.trace.recording.trace_bag import Entry
+from mauve_rt.trace.recording.ledger import Entry
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.blocks import Cell, Section, details, table
 from mauve_rt.trace.report.units import share_text, time_text

@@ -27,7 +27,7 @@ from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import component_statistics
-from mauve_rt.trace.recording.trace_bag import LEDGER, ledger_of
+from mauve_rt.trace.recording.ledger import LEDGER, ledger_of
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
