@@ -53,7 +53,10 @@ def bag() -> str:
             table(("topic", "type", "contents"), rows),
             "## Keys of the custom data\n",
             "`metadata.yaml` has these keys in its `custom_data`.\n",
-            table(("key", "meaning"), [_key("DROPPED_MESSAGES"), _key("LEDGER")]),
+            table(
+                ("key", "meaning"),
+                [_key("DROPPED_MESSAGES"), _key("LEDGER"), _key("DELETED", "bag.deletion")],
+            ),
             "Each entry of `mauve_topics` has these numbers, in this order:\n",
             table(("number", "meaning"), _ledger()),
         ]
@@ -65,10 +68,10 @@ def _first_sentence(kind: str) -> str:
     return " ".join(head.split()).partition(". ")[0].rstrip(".") + "."
 
 
-def _key(name: str) -> tuple[str, str]:
+def _key(name: str, module_name: str = "recording.ledger") -> tuple[str, str]:
     from _reference.python_api import below  # noqa: PLC0415
 
-    module, nodes = find("mauve_rt.trace.recording.ledger", name)
+    module, nodes = find(f"mauve_rt.trace.{module_name}", name)
     [node] = nodes
     assert isinstance(node, ast.Assign)  # noqa: S101 - a constant
     meaning = below(module, nodes).removeprefix("Key in the custom data of metadata.yaml: ")

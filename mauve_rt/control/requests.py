@@ -77,6 +77,7 @@ class RecordingOrder:
     values: tuple[str, ...] = ()
     split_s: float = 0.0  # 0: the default
     split_bytes: int = 0
+    max_size_bytes: int = 0  # 0: no limit
 
     def __str__(self) -> str:
         words = "stop_recording"

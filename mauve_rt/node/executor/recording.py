@@ -390,7 +390,11 @@ class RecordingOrders:
             )
             raise RefusalError(Code.INVALID, text)
         try:
-            split = Split(after_s=order.split_s or Split().after_s, after_bytes=order.split_bytes)
+            split = Split(
+                after_s=order.split_s or Split().after_s,
+                after_bytes=order.split_bytes,
+                max_bytes=order.max_size_bytes,
+            )
             directory = self._recording.start(bag, order.topics, split=split, values=order.values)
         except ParameterError as error:
             raise RefusalError(Code.INVALID, str(error)) from error

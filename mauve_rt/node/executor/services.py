@@ -410,6 +410,7 @@ def _start_recording(ros: Any) -> Request:
         values=tuple(ros.values),
         split_s=ros.split_s,
         split_bytes=ros.split_bytes,
+        max_size_bytes=ros.max_size_bytes,
     )
     return Request(recording=order, **_common(ros))
 

@@ -39,6 +39,12 @@ PARAMETERS: dict[str, Setting] = {
     "bag_split_bytes": Setting(
         0, "size at which a recording goes on in a new file, in bytes; 0: never", _CONFIGURED, minimum=0
     ),
+    "bag_max_size_bytes": Setting(
+        0,
+        "size of all files of a recording beyond which it deletes its oldest file, in bytes; 0: never",
+        _CONFIGURED,
+        minimum=0,
+    ),
     "bag_waits_for_room": Setting(
         default=False,
         description="a disk that is full or fails pauses a recording until it writes again; else it ends it",

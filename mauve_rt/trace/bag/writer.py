@@ -66,6 +66,9 @@ class BagWriter:
         self._schemas: dict[str, tuple[int, Definition]] = {}
         self._topics: dict[str, _Topic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
+        self._removed: list[BagFileCounts] = []  # of these, no longer named by the next metadata.yaml
+        self._to_delete: list[BagFileCounts] = []  # metadata.yaml names them no longer
+        self._number = 0  # of the present file
         self._stale = True  # metadata.yaml does not tell what the files hold
         self._told: set[str] = set()  # the files that metadata.yaml names
         self._opened = ExitStack()
@@ -115,6 +118,16 @@ class BagWriter:
     def file_bytes(self) -> int:
         """Bytes of the present file."""
         return self._file.size
+
+    @property
+    def total_bytes(self) -> int:
+        """Bytes of all files that the next metadata.yaml names."""
+        return self._file.size + sum(file.size for file in self._complete)
+
+    @property
+    def file_name(self) -> str:
+        """Name of the present file."""
+        return self._file.path.name
 
     @property
     def file_start_ns(self) -> int:
@@ -190,10 +203,44 @@ class BagWriter:
 
         """
         self._flush(sync=True)
-        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
-        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        before, self._file = self._file, self._new_file(self.directory, self._number + 1)
+        self._number += 1
+        self._complete.append(BagFileCounts(before.path.name, before.flushed, before.size))
         self._declare()
         before.close()
+
+    def remove_oldest(self) -> BagFileCounts | None:
+        """Leave out the oldest file with the next flush, which names it no longer; None: there is no other.
+
+        Then delete_removed() deletes it. A kill between both leaves a file that metadata.yaml does not name.
+        """
+        if not self._complete or not (self._file.is_waiting or self._file.flushed.messages):
+            return None
+        removed = self._complete.pop(0)
+        self._removed.append(removed)
+        self._stale = True
+        return removed
+
+    def messages_in(self, file: BagFileCounts) -> dict[str, int]:
+        """How many messages of each topic a file holds."""
+        by_channel = file.counts.by_channel
+        return {name: by_channel.get(topic.channel_id, 0) for name, topic in self._topics.items()}
+
+    def delete_removed(self) -> None:
+        """Delete the files that a flush left out.
+
+        Raises:
+            DiskError: one cannot be deleted; the next call tries again.
+
+        """
+        while self._to_delete:
+            path = self.directory / self._to_delete[0].name
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                msg = f"bag file {path}: cannot be deleted ({error.strerror})"
+                raise DiskError(msg) from error
+            del self._to_delete[0]
 
     def drop_waiting(self) -> dict[str, int]:
         """Give up what no flush could write; how many messages it was, by topic. Only go_on() helps then."""
@@ -226,8 +273,8 @@ class BagWriter:
             DiskError: as flush; the bag is as before.
 
         """
-        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
-        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        before, self._file = self._file, self._new_file(self.directory, self._number + 1)
+        self._complete.append(BagFileCounts(before.path.name, before.flushed, before.size))
         try:
             self._declare()
             begin()
@@ -238,6 +285,7 @@ class BagWriter:
             self._complete.pop()
             self._file = before
             raise
+        self._number += 1
         before.abort()
 
     def _declare(self) -> None:
@@ -273,10 +321,17 @@ class BagWriter:
         if self._custom_data:
             self._file.set_metadata(CUSTOM_DATA, self._custom_data)
         metadata = self._metadata if self._stale else None
-        if is_last:
-            self._file.finish(metadata=metadata)
-        else:
-            self._file.flush(metadata=metadata, sync=sync)
+        try:
+            if is_last:
+                self._file.finish(metadata=metadata)
+            else:
+                # What names a file no longer is on the disk before the file is deleted.
+                self._file.flush(metadata=metadata, sync=sync or bool(self._removed))
+        except TraceError:
+            self._complete[:0], self._removed = self._removed, []  # as on the disk
+            raise
+        self._to_delete += self._removed
+        self._removed = []
         if self._stale:
             self._told = {file.name for file in self._files()}
         self._stale = False

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from mauve_rt.trace.bag.deletion import Deleted, deleted_of
 from mauve_rt.trace.bag.files import MCAP, bag_files
 from mauve_rt.trace.bag.mcap_library import Channel
 from mauve_rt.trace.bag.mcap_scan import McapScan
@@ -59,19 +60,29 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
 
     """
     files = bag_files(Path(path))
-    files = [file for file in files if file.stat().st_size] or files  # a kill leaves one just begun empty
+    sizes = {file: size for file in files if (size := _size(file))}  # a kill leaves one just begun empty
+    sizes = sizes or dict.fromkeys(files, 0)
     content = _Content(Path(path))
-    sizes = [file.stat().st_size for file in files]
     done = 0
-    for file, size in zip(files, sizes, strict=True):
+    for file, size in sizes.items():
+        if len(sizes) > 1 and not file.exists():  # deleted since, for the size of the bag
+            continue
         with _scan(file) as scan:
             for channel, message in scan.messages():
                 content.add(scan, channel, message.data, published_ns=message.publish_time)
-                progress((done + scan.whole_bytes) / max(sum(sizes), 1), "reading")
+                progress((done + scan.whole_bytes) / max(sum(sizes.values()), 1), "reading")
             content.ledger = ledger_of(scan.custom_data) or content.ledger
+            content.deleted = deleted_of(scan.custom_data) or content.deleted
             content.files.append(BagFile(file, scan.library, scan.whole_bytes, scan.damage))
         done += size
-    return content.trace(files)
+    return content.trace([file.path for file in content.files])
+
+
+def _size(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except FileNotFoundError:  # the recorder has just deleted it: the bag has a limit of size
+        return 0
 
 
 def _scan(file: Path) -> "McapScan | SqliteScan":
@@ -88,6 +99,7 @@ class _Content:
     def __init__(self, path: Path) -> None:
         self.files: list[BagFile] = []
         self.ledger: dict[str, Entry] = {}  # as the last file tells
+        self.deleted: Deleted | None = None  # likewise
         self._path = path
         self._topics: set[str] = set()
         self._all_topics: dict[str, tuple[str, int]] = {}
@@ -170,6 +182,7 @@ class _Content:
             files=tuple(self.files),
             topics=self._all_topics,
             ledger=self.ledger,
+            deleted=(self.deleted,) if self.deleted is not None else (),
             kinds=self._kinds,
             decisions=traced_decisions(decided, self._names, self._kinds),
             shadow_reports=tuple(

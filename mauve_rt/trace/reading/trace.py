@@ -25,6 +25,7 @@ from mauve_rt.trace.reading.facts import (
 from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:
+    from mauve_rt.trace.bag.deletion import Deleted
     from mauve_rt.trace.reading.frames import Frames
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
@@ -58,6 +59,8 @@ class Trace:
     """Of every topic in the bag, the trace's own too: type and number of messages."""
     ledger: Mapping[str, "Entry"] = field(default_factory=dict)
     """What became of the messages of each topic; empty where the bag does not tell."""
+    deleted: tuple["Deleted", ...] = ()
+    """What the limit of a bag's size deleted of its begin: one of each bag that lacks its begin."""
     kinds: Mapping[int, RecordKind] = field(default_factory=kinds_known)
     """What the kinds of records are called, as told in the bag: newer ones than this reader's among them."""
     decisions: tuple[TracedDecision, ...] = ()
@@ -206,6 +209,7 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         files=tuple(file for trace in traces.values() for file in trace.files),
         topics=_all_topics(traces.values()),
         ledger=_all_entries(traces.values()),
+        deleted=tuple(one for trace in traces.values() for one in trace.deleted),
         kinds={number: kind for trace in traces.values() for number, kind in trace.kinds.items()},
         decisions=_all_decisions(traces),
         shadow_reports=tuple(

@@ -8,7 +8,7 @@ DROPPED_MESSAGES = "mauve_dropped_messages"
 """Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
 LEDGER = "mauve_topics"
 """Key in the custom data of metadata.yaml: a JSON object of each topic's Entry. What is in the bag of it is
-`received - lost + repeated` messages."""
+`received - lost + repeated - deleted` messages."""
 INTERRUPTIONS = "mauve_interruptions"
 """Key in the custom data of metadata.yaml: a JSON list of each Interruption."""
 
@@ -26,11 +26,13 @@ class Entry(NamedTuple):
     """Of a topic of other nodes: messages that were sent and did not come, as far as that is known."""
     numbered: bool | None = None
     """Of a topic of other nodes: whether its messages are numbered, so that gaps are known. Else null."""
+    deleted: int = 0
+    """Of the messages in the bag, those that were in files that the limit of the bag's size deleted."""
 
     @property
     def recorded(self) -> int:
         """What the bag has of it."""
-        return self.received - self.lost + self.repeated
+        return self.received - self.lost + self.repeated - self.deleted
 
     def plus(self, other: "Entry") -> "Entry":
         """Return both together: of a topic that is recorded twice, in one bag or in several."""
@@ -41,6 +43,7 @@ class Entry(NamedTuple):
             self.repeated + other.repeated,
             self.lost_before + other.lost_before,
             all(known) if known else None,
+            self.deleted + other.deleted,
         )
 
 

@@ -6,13 +6,22 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
+from mauve_rt.trace.bag.deletion import DELETED, Deleted
 from mauve_rt.trace.bag.disk import Disk
+from mauve_rt.trace.bag.metadata import BagFileCounts
 from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
-from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry, Interruption
+from mauve_rt.trace.recording.ledger import (
+    DROPPED_MESSAGES,
+    INTERRUPTIONS,
+    LEDGER,
+    Entry,
+    Interruption,
+)
 from mauve_rt.trace.recording.sources import Drain, TraceWords
 
 BATCHES = "trace/batches"
@@ -25,6 +34,26 @@ _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
 _ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
 _LATCHED = TopicQos(depth=1, transient_local=True)
+
+
+class _Gone(NamedTuple):
+    """What the limit of the bag's size deleted."""
+
+    deleted: Deleted
+    messages: Counter[str] = Counter()  # noqa: RUF012 - never changed
+
+    def plus(self, file: BagFileCounts, records: int, messages: Mapping[str, int]) -> "_Gone":
+        """Return it with a further file."""
+        before = self.deleted
+        counts = file.counts
+        deleted = before._replace(
+            files=before.files + 1,
+            records=before.records + records,
+            from_ns=before.from_ns or counts.start_ns,
+            until_ns=max(before.until_ns, counts.end_ns),
+            last_file=file.name,
+        )
+        return _Gone(deleted, self.messages + Counter(messages))
 
 
 class TraceBag:
@@ -82,6 +111,9 @@ class TraceBag:
         self._repeated_waiting: Counter[str] = Counter()  # for the next flush
         self._records_waiting = 0
         self._dropped_flushed = 0  # by the rings
+        self._entries: dict[str, Entry] = {}  # but for what this class adds
+        self._records_in: Counter[str] = Counter()  # by file
+        self._gone = _Gone(Deleted(self._split.max_bytes))
         self._interruptions: deque[Interruption] = deque(maxlen=_MOST_INTERRUPTIONS)
         self._is_interrupted = False
         self._last: Drain | None = None
@@ -104,7 +136,9 @@ class TraceBag:
         A batch without records (it tells of losses) is written if `whole`.
         """
         self._last = drain
-        self._records_waiting += len(drain.records) // _RECORD_BYTES
+        count = len(drain.records) // _RECORD_BYTES
+        self._records_waiting += count
+        self._records_in[self._bag.file_name] += count
         self._write_names(drain)
         if drain.records or messages or whole:
             self._write_batch(drain, drain.records)
@@ -154,15 +188,23 @@ class TraceBag:
         for topic, entry in (others or {}).items():
             # Own as well: a resource was bound to it while it was recorded.
             told[topic] = entry.plus(told.get(topic, Entry()))
+        self._entries = told
+        self._tell_ledger()
+
+    def _tell_ledger(self) -> None:
+        gone = self._gone
         entries = {
-            topic: entry._replace(repeated=self._repeated[topic])._asdict() for topic, entry in told.items()
+            topic: entry._replace(repeated=self._repeated[topic], deleted=gone.messages[topic])._asdict()
+            for topic, entry in self._entries.items()
         }
         self._bag.set_custom_data(LEDGER, json.dumps(entries))
+        if gone.deleted.files:
+            messages = sum(gone.messages[topic] for topic in self._entries)
+            self._bag.set_custom_data(DELETED, json.dumps(gone.deleted._replace(messages=messages)._asdict()))
 
     def flush(self) -> None:
         """Make the bag a finished one of all that was written; go on in a new file when it is time."""
-        self._bag.flush()
-        self._note_flushed()
+        self._write_out(self._bag.flush)
         last = self._last
         if last is not None and self._is_time_to_split(self._log_time_ns(last, last.monotonic_ns)):
             self._bag.split()
@@ -170,8 +212,27 @@ class TraceBag:
 
     def finish(self) -> None:
         """Flush a last time. Then abort() closes the bag."""
-        self._bag.finish()
+        self._write_out(self._bag.finish)
+
+    def _write_out(self, flush: Callable[[], None]) -> None:
+        """Flush; where the bag is too large, without the oldest files, which are deleted afterwards."""
+        before = self._gone
+        while 0 < self._split.max_bytes < self._bag.total_bytes:
+            removed = self._bag.remove_oldest()
+            if removed is None:
+                break
+            records = self._records_in[removed.name]
+            self._gone = self._gone.plus(removed, records, self._bag.messages_in(removed))
+        if self._gone is not before:
+            self._tell_ledger()
+        try:
+            flush()
+        except TraceError:
+            self._gone = before
+            self._tell_ledger()
+            raise
         self._note_flushed()
+        self._bag.delete_removed()
 
     def close(self) -> None:
         """Flush a last time, and close."""
@@ -196,6 +257,7 @@ class TraceBag:
         now_ns = self._last.realtime_ns if self._last is not None else time.time_ns()
         self._interruptions.append(Interruption(reason[:_LONGEST_REASON], now_ns))
         self._is_interrupted = True
+        self._records_in[self._bag.file_name] -= self._records_waiting
         self._lose_records(self._records_waiting)
         return lost
 
@@ -272,7 +334,7 @@ class TraceBag:
 
     def _is_time_to_split(self, now_ns: int) -> bool:
         age_s = (now_ns - (self._bag.file_start_ns or now_ns)) / 1e9
-        return 0 < self._split.after_s <= age_s or 0 < self._split.after_bytes <= self._bag.file_bytes
+        return 0 < self._split.after_s <= age_s or 0 < self._split.file_bytes <= self._bag.file_bytes
 
     def _write_batch(self, drain: Drain, records: bytes) -> None:
         batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, records)

@@ -101,7 +101,8 @@ def losses_section(analysis: Analysis) -> Section:
         (name, loss.written, loss.received, Cell(f"{loss.lost:,}", "attention" if loss.lost else ""))
         for name, loss in analysis.trace.losses.items()
     ]
-    html = table(("component", "records written", "in the bag", "lost"), rows)
+    html = "".join(f"<p>{escape(_sentence(one.text))}</p>" for one in analysis.trace.deleted)
+    html += table(("component", "records written", "in the bag", "lost"), rows)
     if others := [
         _topic_row(*item) for item in analysis.trace.ledger.items() if item[1].numbered is not None
     ]:
@@ -113,6 +114,10 @@ def losses_section(analysis: Analysis) -> Section:
     if files:
         html += details("Files", table(("file", "written by", "bytes read", "state"), files))
     return Section("What is in the trace", html, anchor="losses")
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _topic_row(topic: str, entry: Entry) -> tuple[object, ...]:

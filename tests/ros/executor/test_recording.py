@@ -122,6 +122,34 @@ def test_a_keeper_writes_the_bag(executor: ExecutorProcess, graph: Any, tmp_path
     assert "tear the bag" not in executor.output, "it never fell back on its own writes"
 
 
+def test_a_bag_of_limited_size_keeps_the_newest_files(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    bag = tmp_path / "bag"
+    settings = ("bag_split_bytes:=20000", "bag_max_size_bytes:=60000", f"bag:={bag}")
+    arguments = [word for setting in settings for word in ("-p", setting)]
+    executor = start_executor("-p", f"architecture:={architecture}", *arguments)
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    graph.spin_until(lambda: not (bag / "bag_2.mcap").exists() and (bag / "bag_5.mcap").exists(), "deletions")
+    executor.end(signal.SIGTERM)
+    (deleted,) = mauve_rt.trace.open(bag).deleted
+    assert deleted.files > 2
+    assert deleted.records > 0
+    assert not [finding for finding in check_bag(bag) if finding.kind != "note"]
+    assert_rosbag2_reads(bag)
+
+
+def test_limits_that_do_not_fit_are_refused(architecture: Path, start_executor: Starter, tmp_path: Path):
+    settings = ("bag_split_bytes:=20000", "bag_max_size_bytes:=30000", f"bag:={tmp_path / 'bag'}")
+    arguments = [word for setting in settings for word in ("-p", setting)]
+    executor = start_executor("-p", f"architecture:={architecture}", *arguments)
+    executor.await_output(
+        "parameter bag_max_size_bytes: expected at least twice the size of a file, 40,000 bytes"
+    )
+    assert not (tmp_path / "bag").exists()
+
+
 def test_one_bag_after_the_other(executor: ExecutorProcess, graph: Any):
     bags = []
     for _ in range(2):
@@ -170,6 +198,12 @@ REFUSED = [
     ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
     ({"split_s": float("nan")}, "INVALID", "bad split_s"),
     ({"split_bytes": 5}, "INVALID", "bad split_bytes"),
+    ({"max_size_bytes": 399_999}, "INVALID", "bad max_size_bytes: expected 0 (no limit) or at least 400,000"),
+    (
+        {"split_bytes": 200_000, "max_size_bytes": 399_999},
+        "INVALID",
+        "expected at least twice the size of a file, 400,000 bytes, found 399,999",
+    ),
     ({"expected_revision": 1000}, "WRONG_REVISION", "expected 1000"),
 ]
 
@@ -360,7 +394,7 @@ def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tm
     assert (note.kind, note.text.partition(":")[0]) == ("note", "/robot_1/talk"), "nothing of the executor"
     assert "no gap between the first and the last message of each writer" in note.text
     ledger = json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])
-    others = {"lost_before": 0, "numbered": True}
+    others = {"lost_before": 0, "numbered": True, "deleted": 0}
     assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0, **others}
     assert ledger["/robot_1/count"]["numbered"] is None
     with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
