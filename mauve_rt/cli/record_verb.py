@@ -27,7 +27,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME[:TYPE[:QOS]]",
-        help="record this topic too; may be repeated",
+        help="record this topic too; '/camera/*' takes topics by a pattern, also those that appear later; "
+        "may be repeated",
+    )
+    start.add_argument(
+        "--topic-regex",
+        action="append",
+        default=[],
+        metavar="REGEX",
+        help="record each topic whose name contains a match, also those that appear later; may be repeated",
     )
     values = start.add_argument(
         "--value",
@@ -74,6 +82,7 @@ def main(args: argparse.Namespace) -> int:
         "start_recording",
         bag=args.bag,
         topics=args.topic,
+        topic_regexes=args.topic_regex,
         values=args.value,
         split_s=args.split_s,
         split_bytes=max(round(args.split_mb * 1e6), 0),

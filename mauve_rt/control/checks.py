@@ -105,8 +105,8 @@ def _check_rule(request: Request) -> None:
 
 
 def _check_recording(order: RecordingOrder) -> None:
-    texts = [order.bag, *order.topics, *order.values]
-    many = max(len(order.topics), len(order.values))
+    texts = [order.bag, *order.topics, *order.topic_regexes, *order.values]
+    many = max(len(order.topics) + len(order.topic_regexes), len(order.values))
     if many > MAX_TOPICS or any(len(text) > MAX_TEXT for text in texts):
         what = f"{MAX_TOPICS} topics and {MAX_TOPICS} values"
         text = f"expected at most {what}, and no text longer than {MAX_TEXT} characters"

@@ -269,13 +269,13 @@ class ExecutorNode(LifecycleNode):
         self._sentinel.configure()
         self._mirrors.configure(self._runtime.model.mirrors)
         with self._properties.lock:
-            names = ("rules", "bag", "record_topics")
-            rules, bag, topics = (self.get_parameter(name).value for name in names)
+            names = ("rules", "bag", "record_topics", "record_topic_regexes")
+            rules, bag, topics, expressions = (self.get_parameter(name).value for name in names)
             split = self._split()
         self._rules.configure(rules)
         self._folder.configure(self._runtime)
         if bag:
-            self._recording.start(Path(bag), topics, split=split)
+            self._recording.start(Path(bag), topics, split=split, expressions=expressions)
         self._log_realtime()
         parts = counted(len(self._runtime.components()), "component")
         resources = counted(len(self._runtime.described_resources()), "resource")

@@ -407,6 +407,7 @@ def _start_recording(ros: Any) -> Request:
         start=True,
         bag=ros.bag,
         topics=tuple(ros.topics),
+        topic_regexes=tuple(ros.topic_regexes),
         values=tuple(ros.values),
         split_s=ros.split_s,
         split_bytes=ros.split_bytes,

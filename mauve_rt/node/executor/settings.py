@@ -26,7 +26,15 @@ PARAMETERS: dict[str, Setting] = {
     ),
     "bags": Setting("", "folder in which ~/start_recording creates bags; empty: the working directory"),
     "record_topics": Setting(
-        [], "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
+        [],
+        "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos; "
+        "/camera/* takes topics by a pattern, also those that appear later",
+        _CONFIGURED,
+    ),
+    "record_topic_regexes": Setting(
+        [],
+        "regular expressions: topics whose names contain a match are recorded, also later ones",
+        _CONFIGURED,
     ),
     "record_queue_bytes": Setting(
         67_108_864,  # 64 MiB

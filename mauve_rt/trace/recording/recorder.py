@@ -4,11 +4,11 @@ import contextlib
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
-from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, Entry
 from mauve_rt.trace.recording.sources import Drain, MessageSource, TopicSource, TraceSource
@@ -289,12 +289,12 @@ class Recorder:
         """Count what came: it is lost."""
         with self._lock:
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
-        drain, taken, batch = self._tap.take()
+        drain, taken, batch, topics = self._tap.take()
         more = Counter(message.topic for message in taken)
         if self._topics is not None and batch is not None:
-            for topic, count in zip(self._topics.topics, batch.sizes, strict=True):
+            for topic, count in zip(topics, batch.sizes, strict=True):
                 self._refused[topic.name] += count
-            self._others = self._entries(self._topics, batch)
+            self._others = self._entries(topics, batch, numbered=self._topics.numbered)
         with self._lock:
             self._received += more
             self._lost += more + Counter(message.topic for message in waiting)
@@ -333,30 +333,32 @@ class Recorder:
                 self._received.copy(),
                 self._lost.copy(),
             )  # with what waits: the bag tells of no more
-        drain, taken, batch = self._tap.take()
+        drain, taken, batch, topics = self._tap.take()
         more = Counter(message.topic for message in taken)
         waiting += taken
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)
         if self._topics is not None and batch is not None:
-            self._refused += self._bag.write_received(batch, self._topics.topics, drain)
-            self._others = self._entries(self._topics, batch)
+            self._refused += self._bag.write_received(batch, topics, drain)
+            self._others = self._entries(topics, batch, numbered=self._topics.numbered)
         with self._lock:
             self._received += more
             self._lost += refused
         self._bag.tell_ledger(received + more, lost + refused, self._others)
         self._bag.tell_dropped(self.dropped_messages)
 
-    def _entries(self, source: TopicSource, batch: ReceivedBatch) -> dict[str, Entry]:
+    def _entries(
+        self, topics: Sequence[ReceivedTopic], batch: ReceivedBatch, *, numbered: bool
+    ) -> dict[str, Entry]:
         return {
             topic.name: Entry(
                 received=received,
                 lost=lost + self._refused[topic.name],
                 lost_before=lost_before,
-                numbered=source.numbered,
+                numbered=numbered,
             )
-            for topic, (received, lost_before, lost) in zip(source.topics, batch.counts, strict=True)
+            for topic, (received, lost_before, lost) in zip(topics, batch.counts, strict=True)
         }
 
     def _report(self, text: str) -> None:

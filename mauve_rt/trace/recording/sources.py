@@ -65,7 +65,7 @@ class TopicSource(Protocol):
 
     @property
     def topics(self) -> Sequence[ReceivedTopic]:
-        """In the order of their numbers."""
+        """In the order of their numbers; further ones come behind."""
 
     @property
     def numbered(self) -> bool:

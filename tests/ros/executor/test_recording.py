@@ -195,6 +195,14 @@ REFUSED = [
     ),
     ({"topics": ["a b"]}, "INVALID", "'a b'"),
     ({"topics": [""]}, "INVALID", "expected a name, found ''"),
+    ({"topics": ["camera/*"]}, "INVALID", "expected /NAME, /NAME:package/msg/Type of an installed message"),
+    ({"topics": ["/camera/*:std_msgs/msg/Imgae"]}, "INVALID", "found '/camera/*:std_msgs/msg/Imgae'"),
+    ({"topics": ["/camera/*:std_msgs/msg/Float64:wrong"]}, "INVALID", "pattern of topics to record"),
+    (
+        {"topic_regexes": ["("]},
+        "INVALID",
+        "expected a regular expression, found '(': missing ), unterminated subpattern at position 0",
+    ),
     ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
     ({"split_s": float("nan")}, "INVALID", "bad split_s"),
     ({"split_bytes": 5}, "INVALID", "bad split_bytes"),
@@ -499,6 +507,55 @@ def test_messages_lost_before_the_recorder_are_reported_everywhere(
     assert "of other nodes were lost before they came here" in stop(graph).message
     losses = [finding.text for finding in check_bag(tmp_path / "bag") if finding.is_loss]
     assert any(text.startswith("topic /burst: ") and "lost before the recorder" in text for text in losses)
+
+
+@pytest.mark.parametrize("fields", [{"topics": ["/camera/*"]}, {"topic_regexes": ["^/camera/"]}])
+def test_topics_by_pattern_are_recorded_also_those_that_appear_later(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path, fields: dict[str, list[str]]
+) -> None:
+    graph.node.create_publisher(UInt64, "/elsewhere", 10)
+    left = graph.node.create_publisher(UInt64, "/camera/left", 100)
+    reply = start(graph, bag="bag", **fields)
+    assert reply.success, reply.message
+    told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
+
+    def received(topic: str) -> int:
+        key = f"received[{topic}]"
+        all_values = [value for array in told for one in array.status for value in one.values]
+        return max((int(value.value) for value in all_values if value.key == key), default=0)
+
+    def is_received(voice: Any, topic: str) -> bool:
+        voice.publish(UInt64(data=1))
+        return received(topic) > 2
+
+    graph.spin_until(lambda: is_received(left, "/camera/left"), "a topic that was there")
+    right = graph.node.create_publisher(UInt64, "/camera/right/raw", 100)
+    graph.spin_until(lambda: is_received(right, "/camera/right/raw"), "a topic that appeared later")
+    before = received("/camera/left")
+    graph.spin_until(lambda: is_received(left, "/camera/left") and received("/camera/left") > before, "both")
+    assert stop(graph).success
+    topics = topics_of(tmp_path / "bag")
+    assert topics["/camera/left"] > 2
+    assert topics["/camera/right/raw"] > 2
+    assert "/elsewhere" not in topics
+    assert {finding.kind for finding in check_bag(tmp_path / "bag")} == {"note"}
+    ledger = ledger_of(examine_bag(tmp_path / "bag").custom_data)
+    assert ledger["/camera/right/raw"].received == topics["/camera/right/raw"]
+
+
+def test_a_pattern_takes_nothing_twice(executor: ExecutorProcess, graph: Any, tmp_path: Path) -> None:
+    assert start(graph, bag="bag", topics=["/*"], topic_regexes=["."]).success
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 20, "counts")
+    assert stop(graph).success
+    trace = mauve_rt.trace.open(tmp_path / "bag")
+    numbers = [message.msg.data for message in trace.messages("/robot_1/count")]
+    assert len(numbers) == len(set(numbers)) > 10
+    ledger = ledger_of(examine_bag(tmp_path / "bag").custom_data)
+    others = {topic for topic, entry in ledger.items() if entry.numbered is not None}
+    assert "/robot_1/count" not in others
+    assert not [topic for topic in others if topic.startswith((f"{EXECUTOR}/state", f"{EXECUTOR}/trace"))]
+    assert not [finding for finding in check_bag(tmp_path / "bag") if finding.kind != "note"]
 
 
 def test_another_type_on_a_topic_to_record_is_told(executor: ExecutorProcess, graph: Any):
