@@ -41,7 +41,7 @@ def bag() -> str:
     """The topics that each bag has, and the keys of the custom data."""
     [own] = [
         node
-        for node in tree_of(ROOT / "mauve_rt/node/executor/recording.py").body
+        for node in tree_of(ROOT / "mauve_rt/node/executor/topic_choice.py").body
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_OWN"
     ]
     topics = ast.literal_eval(own.value)

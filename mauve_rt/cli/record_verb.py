@@ -5,6 +5,7 @@ import argparse
 from mauve_rt.cli.arguments import add_executor_and_json
 from mauve_rt.cli.completion import complete_values, completed_by
 from mauve_rt.cli.request import add_request_fields, send_request
+from mauve_rt.trace.bag.recorded import COMPRESSIONS
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -66,6 +67,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MB",
         help="size of the whole bag: beyond it the oldest file is deleted (default: no limit)",
     )
+    start.add_argument(
+        "--compression",
+        choices=COMPRESSIONS,
+        default="none",
+        help="compression of the chunks of the files (default: none)",
+    )
     for action in (start, stop):
         add_request_fields(action)
 
@@ -86,5 +93,6 @@ def main(args: argparse.Namespace) -> int:
         values=args.value,
         split_s=args.split_s,
         split_bytes=max(round(args.split_mb * 1e6), 0),
+        compression=args.compression,
         max_size_bytes=max(round(args.max_size_mb * 1e6), 0),
     )

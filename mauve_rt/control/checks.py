@@ -8,7 +8,7 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import LONGEST_IDLE_S, Step
-from mauve_rt.trace.bag.recorded import FILES_OF_A_BAG, Split
+from mauve_rt.trace.bag.recorded import COMPRESSIONS, FILES_OF_A_BAG, Split
 
 MAX_TIMEOUT_S = 10.0
 MAX_TEXT = 1000
@@ -119,6 +119,9 @@ def _check_recording(order: RecordingOrder) -> None:
     if order.split_bytes != 0 and order.split_bytes < MIN_SPLIT_BYTES:
         text = f"bad split_bytes: expected 0 (any size) or at least {MIN_SPLIT_BYTES:,}"
         raise RefusalError(Code.INVALID, f"{text}, found {order.split_bytes:,}")
+    if order.compression not in ("", *COMPRESSIONS):
+        text = f"bad compression: expected {' or '.join(COMPRESSIONS)}, found {shown(order.compression)}"
+        raise RefusalError(Code.INVALID, text)
     if order.max_size_bytes != 0:
         split = Split(after_bytes=order.split_bytes, max_bytes=order.max_size_bytes)
         least = f"expected 0 (no limit) or at least {FILES_OF_A_BAG * MIN_SPLIT_BYTES:,} bytes"

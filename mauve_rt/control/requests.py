@@ -79,6 +79,7 @@ class RecordingOrder:
     split_s: float = 0.0  # 0: the default
     split_bytes: int = 0
     max_size_bytes: int = 0  # 0: no limit
+    compression: str = ""  # empty: none
 
     def __str__(self) -> str:
         words = "stop_recording"

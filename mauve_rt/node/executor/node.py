@@ -39,7 +39,7 @@ from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_s
 from mauve_rt.node.shared.settings import OF_RCLPY, refusal
 from mauve_rt.node.shared.wall_clock import WallClock
 from mauve_rt.node.shared.watch import Watch
-from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.bag.recorded import COMPRESSIONS, Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
@@ -271,16 +271,26 @@ class ExecutorNode(LifecycleNode):
         with self._properties.lock:
             names = ("rules", "bag", "record_topics", "record_topic_regexes")
             rules, bag, topics, expressions = (self.get_parameter(name).value for name in names)
-            split = self._split()
+            split, compression = self._split(), self._compression()
         self._rules.configure(rules)
         self._folder.configure(self._runtime)
         if bag:
-            self._recording.start(Path(bag), topics, split=split, expressions=expressions)
+            self._recording.start(
+                Path(bag), topics, split=split, expressions=expressions, compression=compression
+            )
         self._log_realtime()
         parts = counted(len(self._runtime.components()), "component")
         resources = counted(len(self._runtime.described_resources()), "resource")
         recorded = f", recording to {bag}" if bag else ""
         self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
+
+    def _compression(self) -> str:
+        name = str(self.get_parameter("bag_compression").value)
+        if name not in COMPRESSIONS:
+            raise ParameterError(
+                f"parameter bag_compression: expected {' or '.join(COMPRESSIONS)}, found '{name}'"
+            )
+        return name
 
     def _split(self) -> Split:
         names = ("bag_split_s", "bag_split_bytes", "bag_max_size_bytes")

@@ -107,6 +107,7 @@ class Recording:
         split: Split,
         values: Sequence[str] = (),
         expressions: Sequence[str] = (),
+        compression: str = "none",
     ) -> Path:
         """Create the bag and record from now on; returns its folder, absolute.
 
@@ -118,6 +119,7 @@ class Recording:
                 A name may be a pattern, `/camera/*`, which takes topics that appear later, too.
             split: when to go on in a new file.
             expressions: regular expressions; each topic whose name contains a match, as by a pattern.
+            compression: of the chunks of the files, one of COMPRESSIONS.
             values: resources, or COMPONENT.PORT, whose every write is recorded, besides those of the file.
 
         Raises:
@@ -149,6 +151,7 @@ class Recording:
                 topics=self._received,
                 keeper=native_program("bag_keeper"),
                 waits_for_room=self._waits_for_room,
+                compression=compression,
             )
             try:
                 self._record_into(recorder, shadows)
@@ -346,7 +349,12 @@ class RecordingOrders:
                 max_bytes=order.max_size_bytes,
             )
             directory = self._recording.start(
-                bag, order.topics, split=split, values=order.values, expressions=order.topic_regexes
+                bag,
+                order.topics,
+                split=split,
+                values=order.values,
+                expressions=order.topic_regexes,
+                compression=order.compression or "none",
             )
         except ParameterError as error:
             raise RefusalError(Code.INVALID, str(error)) from error

@@ -412,6 +412,7 @@ def _start_recording(ros: Any) -> Request:
         split_s=ros.split_s,
         split_bytes=ros.split_bytes,
         max_size_bytes=ros.max_size_bytes,
+        compression=ros.compression,
     )
     return Request(recording=order, **_common(ros))
 

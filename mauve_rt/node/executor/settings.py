@@ -53,6 +53,7 @@ PARAMETERS: dict[str, Setting] = {
         _CONFIGURED,
         minimum=0,
     ),
+    "bag_compression": Setting("none", "compression of the chunks of a recording: none or zstd", _CONFIGURED),
     "bag_waits_for_room": Setting(
         default=False,
         description="a disk that is full or fails pauses a recording until it writes again; else it ends it",

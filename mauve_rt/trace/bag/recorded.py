@@ -76,6 +76,8 @@ PackedChannel = tuple[int, int, int, bytes]
 """Channel, first and last log time, entries of its message index."""
 
 
+COMPRESSIONS = ("none", "zstd")
+"""Of the chunks of a bag's files."""
 FILES_OF_A_BAG = 4
 """A bag of limited size has so many files at least, so that a deletion leaves most of it."""
 

@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Self
 
 import mauve_rt
+from mauve_rt.trace.bag.compression import compressor
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
 from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
@@ -49,13 +50,14 @@ class BagWriter:
         ros_distro: str = "jazzy",
         disk: Disk | None = None,
         keeps_room: bool = False,
+        compression: str = "none",
     ) -> None:
         """Create the folder (and its parents) with an empty, finished bag in it; closes `disk` with the bag.
 
-        `keeps_room`: until the end, for write_into_room().
+        `keeps_room`: until the end, for write_into_room(); `compression`: of the chunks, one of COMPRESSIONS.
 
         Raises:
-            TraceError: the folder exists already, or cannot be written.
+            TraceError: the folder exists already, or cannot be written; or the compression is not installed.
 
         """
         self.directory = Path(directory)
@@ -74,6 +76,7 @@ class BagWriter:
         self._opened = ExitStack()
         self._flushed_ns = 0  # latest log time of all that was flushed
         try:
+            self._compress = compressor(compression)
             self._create()
         except TraceError:
             self._disk.close()
@@ -379,7 +382,14 @@ class BagWriter:
         path = directory / f"{self.directory.name}_{number}.mcap"
         library = f"mauve_rt {mauve_rt.__version__}"
         room_bytes = _FILE_ROOM_BYTES if self._keeps_room else 0
-        return McapFile(path, profile="ros2", library=library, disk=self._disk, room_bytes=room_bytes)
+        return McapFile(
+            path,
+            profile="ros2",
+            library=library,
+            disk=self._disk,
+            room_bytes=room_bytes,
+            compress=self._compress,
+        )
 
     def _metadata(self, *, in_place: bool = False, size: int = 0) -> Metadata:
         files = self._files()

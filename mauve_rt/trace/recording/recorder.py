@@ -71,6 +71,7 @@ class Recorder:
         topics: TopicSource | None = None,
         keeper: Path | None = None,
         waits_for_room: bool = False,
+        compression: str = "none",
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -87,6 +88,7 @@ class Recorder:
             topics: of other nodes; it is stopped when the recording ends by itself.
             keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
+            compression: of the chunks of the files, one of COMPRESSIONS; done by the recorder thread.
             waits_for_room: a disk that refuses to write pauses the recording; else it ends the recording.
 
         Raises:
@@ -105,7 +107,13 @@ class Recorder:
         self._refused: Counter[str] = Counter()  # of topics of other nodes
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
-            source, directory, node_name=node_name, on_error=self._report, split=split, disk=disk
+            source,
+            directory,
+            node_name=node_name,
+            on_error=self._report,
+            split=split,
+            disk=disk,
+            compression=compression,
         )
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []

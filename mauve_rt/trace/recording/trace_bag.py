@@ -76,6 +76,7 @@ class TraceBag:
         on_error: Callable[[str], None],
         split: Split | None = None,
         disk: Disk | None = None,
+        compression: str = "none",
     ) -> None:
         """Create the bag; nothing is drained yet.
 
@@ -86,6 +87,7 @@ class TraceBag:
             on_error: called at most once for each type that cannot be recorded, with one line.
             split: when it goes on in a new file; after a minute unless said otherwise.
             disk: closed with the bag.
+            compression: of the chunks of its files, one of COMPRESSIONS.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -95,7 +97,7 @@ class TraceBag:
         self._split = split or Split()
         self._node_name = node_name.rstrip("/")
         self._on_error = on_error
-        self._bag = BagWriter(directory, disk=disk, keeps_room=True)
+        self._bag = BagWriter(directory, disk=disk, keeps_room=True, compression=compression)
         try:
             self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
             self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)

@@ -206,6 +206,7 @@ REFUSED = [
     ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
     ({"split_s": float("nan")}, "INVALID", "bad split_s"),
     ({"split_bytes": 5}, "INVALID", "bad split_bytes"),
+    ({"compression": "lz4"}, "INVALID", "bad compression: expected none or zstd, found 'lz4'"),
     ({"max_size_bytes": 399_999}, "INVALID", "bad max_size_bytes: expected 0 (no limit) or at least 400,000"),
     (
         {"split_bytes": 200_000, "max_size_bytes": 399_999},

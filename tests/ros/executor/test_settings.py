@@ -28,6 +28,7 @@ NODE = "/robot_1/executor"
 FIXED = sorted(name for name, setting in PARAMETERS.items() if setting.is_fixed)
 CHANGEABLE = [
     "bag",
+    "bag_compression",
     "bag_max_size_bytes",
     "bag_split_bytes",
     "bag_split_s",
