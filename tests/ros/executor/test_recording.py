@@ -140,6 +140,17 @@ def test_a_bag_of_limited_size_keeps_the_newest_files(
     assert_rosbag2_reads(bag)
 
 
+def test_a_bag_is_compressed_on_request(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    assert start(graph, bag="bag", compression="zstd").success
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 20, "counts")
+    assert stop(graph).success
+    assert_rosbag2_reads(tmp_path / "bag")
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
+        assert "zstd" in {chunk.compression for chunk in make_reader(stream).get_summary().chunk_indexes}
+    assert check_bag(tmp_path / "bag") == []
+
+
 def test_limits_that_do_not_fit_are_refused(architecture: Path, start_executor: Starter, tmp_path: Path):
     settings = ("bag_split_bytes:=20000", "bag_max_size_bytes:=30000", f"bag:={tmp_path / 'bag'}")
     arguments = [word for setting in settings for word in ("-p", setting)]
