@@ -118,8 +118,8 @@ class TopicReceiver {
   /// Whether the middleware numbers the messages of each writer, so that gaps are known. [non-rt]
   static bool numbered();
 
-  /// Returns the number of the topic, counted from 0. After start() the receiving thread is started again: what arrives
-  /// meanwhile waits in the middleware. Throws Error as ReceivedTopic. [non-rt]
+  /// Returns the number of the topic, counted from 0. After start() the receiving thread is started again: messages that
+  /// arrive during the restart wait in the middleware. Throws Error as ReceivedTopic. [non-rt]
   std::size_t subscribe(const std::string& name, const std::string& type, const rmw_qos_profile_t& qos);
   /// Throws Error when rcl refuses. [non-rt]
   void start();

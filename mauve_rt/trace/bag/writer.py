@@ -4,7 +4,6 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -13,8 +12,9 @@ import mauve_rt
 from mauve_rt.trace.bag.compression import compressor
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
-from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
+from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, metadata_text, named_files
 from mauve_rt.trace.bag.recorded import ReceivedBatch, TopicQos
+from mauve_rt.trace.bag.written_topic import WrittenTopic, counted_topic, declare_channel, declare_schema
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
 from mauve_rt.unfinished import beside
@@ -22,14 +22,6 @@ from mauve_rt.unfinished import beside
 _FILE_ROOM_BYTES, _METADATA_ROOM_BYTES = 8192, 4096
 """Kept in a file, and in metadata.yaml, for the reason of an interruption and the counts of a hundred topics
 that came just before it."""
-
-
-@dataclass(frozen=True)
-class _Topic:
-    name: str
-    definition: Definition
-    qos: str
-    channel_id: int
 
 
 class BagWriter:
@@ -66,7 +58,7 @@ class BagWriter:
         self._keeps_room = keeps_room
         self._custom_data: dict[str, str] = {}
         self._schemas: dict[str, tuple[int, Definition]] = {}
-        self._topics: dict[str, _Topic] = {}
+        self._topics: dict[str, WrittenTopic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
         self._removed: list[BagFileCounts] = []  # of these, no longer named by the next metadata.yaml
         self._to_delete: list[BagFileCounts] = []  # metadata.yaml names them no longer
@@ -160,10 +152,10 @@ class BagWriter:
             raise TraceError(msg)
         if type_name not in self._schemas:
             defined = Definition(type_name, definition, "") if definition else find_definition(type_name)
-            self._schemas[type_name] = (_declare_schema(self._file, defined), defined)
+            self._schemas[type_name] = (declare_schema(self._file, defined), defined)
         schema_id, defined = self._schemas[type_name]
-        topic = _Topic(name, defined, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
-        _declare_channel(self._file, topic, schema_id)
+        topic = WrittenTopic(name, defined, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
+        declare_channel(self._file, topic, schema_id)
         self._topics[name] = topic
         self._stale = True
 
@@ -293,9 +285,9 @@ class BagWriter:
 
     def _declare(self) -> None:
         for _, definition in self._schemas.values():  # in the same order: they get the same numbers
-            _declare_schema(self._file, definition)
+            declare_schema(self._file, definition)
         for topic in self._topics.values():
-            _declare_channel(self._file, topic, self._schemas[topic.definition.type_name][0])
+            declare_channel(self._file, topic, self._schemas[topic.definition.type_name][0])
         self._stale = True
 
     def flush(self) -> None:
@@ -395,24 +387,10 @@ class BagWriter:
         files = self._files()
         data = metadata_text(
             files,
-            [_counted(topic, files) for topic in self._topics.values()],
+            [counted_topic(topic, files) for topic in self._topics.values()],
             custom_data=self._custom_data,
             ros_distro=self._ros_distro,
             room_bytes=_METADATA_ROOM_BYTES if self._keeps_room and not in_place else 0,
             size=size,
         )
         return Metadata(self._folder, data, in_place)
-
-
-def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:
-    messages = sum(file.counts.by_channel.get(topic.channel_id, 0) for file in files)
-    return BagTopic(topic.name, topic.definition.type_name, topic.qos, topic.definition.type_hash, messages)
-
-
-def _declare_schema(file: McapFile, definition: Definition) -> int:
-    return file.add_schema(definition.type_name, encoding="ros2msg", data=definition.text.encode())
-
-
-def _declare_channel(file: McapFile, topic: _Topic, schema_id: int) -> None:
-    metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.definition.type_hash}
-    file.add_channel(topic.name, schema_id=schema_id, encoding="cdr", metadata=metadata)

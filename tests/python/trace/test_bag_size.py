@@ -127,7 +127,7 @@ def test_what_was_deleted_is_reported_and_is_no_loss(
     assert f"<p>T{expected[1:]}" in (tmp_path / "page.html").read_text(encoding="utf-8")
 
 
-def test_a_long_time_is_told_in_minutes() -> None:
+def test_a_long_time_is_shown_in_minutes() -> None:
     assert Deleted(5, from_ns=0, until_ns=723_000_000_000).text.startswith(
         "the first 12 min 3 s were deleted"
     )
