@@ -252,7 +252,7 @@ sequence numbers of a writer) and what found no room.)")
                   "Whether the middleware numbers the messages of each writer, so that gaps are known.")
       .def("subscribe", &TopicReceiver::subscribe, py::arg("topic"), py::arg("type"), py::arg("qos"),
            Unlocked(),
-           R"(Subscribe, before start(); returns the number of the topic, counted from 0.
+           R"(Subscribe, also after start(); returns the number of the topic, counted from 0.
 
 Raises:
     MauveError: the type is not installed, or the middleware refuses.)")

@@ -144,6 +144,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "wakeup_max_us: {warn: 300": (PINNED,),
     },
     "docs/howto/record_and_report.md": {
+        "mauve record start /executor all": (
+            "ros/executor/test_recording.py::test_topics_by_pattern_are_recorded_also_those_that_appear_later",
+        ),
         "mauve record start /executor images": (
             "ros/bridge/test_topic_receiver.py::test_messages_of_4_mb_are_received_or_counted",
         ),
