@@ -13,7 +13,8 @@ from mauve_rt.trace.report.cycles import Array
 MARKER = np.dtype(
     [("time_ns", "<i8"), ("number", "<i8"), ("name", "<i8"), ("value", "<i8"), ("skipped", "<i8")]
 )
-"""value: how late in ns, of a mark the user's a, of a log line its level. Merged: worst value, sum of skipped.
+"""value: how late in ns, of a mark the user's a, of a log line its level. Merged: worst value, sum of
+skipped.
 """
 
 KINDS = {

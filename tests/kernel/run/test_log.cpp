@@ -132,7 +132,7 @@ struct TalkingCore : Core<TalkingShell> {
     log().info("core is ready");
     return true;
   }
-  int runs{0};
+  std::atomic<int> runs{0};
 };
 
 struct TalkingFsm : Fsm<TalkingShell, TalkingCore> {
@@ -238,6 +238,24 @@ TYPED_TEST(LogOnHost, KeepsTheLastLinesOfARemovedComponent) {
   remove.remove_component("c");
   this->host.commit(std::move(remove));
   EXPECT_GE(this->take().size(), 5U);
+}
+
+TEST(LogOnThreads, WritesWithoutAnAllocation) {
+  if (allocation_counting() == AllocationCounting::none)
+    GTEST_SKIP() << "a sanitizer counts allocations itself";
+  Architecture architecture;
+  architecture.add_resource<Talking>("talking");
+  Component& component =
+      architecture.add_component<TalkingShell, TalkingCore, TalkingFsm>("c", {.log_level = LogLevel::debug});
+  architecture.connect("c", "say", "talking", "say");
+  architecture.configure();
+  Deployer deployer(architecture);
+  deployer.deploy();
+  wait_until([&] { return component.core_as<TalkingCore>().runs.load() > 40; },
+             "4 lines in each of 40 releases");
+  EXPECT_EQ(0U, component.task().counters().allocations());
+  deployer.shutdown();
+  EXPECT_FALSE(architecture.log_queue()->drain().lost.empty());
 }
 
 TEST(LogWithoutArchitecture, GoesNowhere) {
