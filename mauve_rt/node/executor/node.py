@@ -419,7 +419,7 @@ class ExecutorNode(LifecycleNode):
     def _release(self) -> None:
         self._runtime.require_parked()
         self._state.flush()
-        self._part_log.write(last=True)
+        self._part_log.write_last()
         self._recording.stop()
         self._rules.close()
         self._folder.close()

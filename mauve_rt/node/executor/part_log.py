@@ -40,6 +40,7 @@ class PartLog:
         self._node = node
         self._runtime = runtime
         self._recording = recording
+        self._watch = watch
         self._lock = threading.Lock()
         self._bundles = LogBundles()
         self._loggers: dict[str, RcutilsLogger] = {}
@@ -47,7 +48,7 @@ class PartLog:
         self._thread = watch.thread("part_log", self._look, ending=self._ending)
         self._thread.start()
 
-    def write(self, *, last: bool = False) -> None:
+    def _write_all(self, *, last: bool) -> None:
         """Write what has come; with the `last` also what was withheld to be bundled."""
         with self._lock:
             now_ns = monotonic_ns()
@@ -58,11 +59,15 @@ class PartLog:
             for line in lines:
                 self._write(line, line.time_ns + ahead_ns)
 
+    def write_last(self) -> None:
+        """Write all that there is; what fails there holds up no stop."""
+        self._watch.guarded("the log of parts", self._write_all)(last=True)
+
     def close(self) -> None:
         """Write the last lines, and end."""
         self._ending.set()
         self._thread.join(_END_S)
-        self.write(last=True)
+        self.write_last()
         with self._lock:
             self._loggers.clear()
 
@@ -78,7 +83,7 @@ class PartLog:
 
     def _look(self) -> None:
         self._ending.wait(_PERIOD_S)
-        self.write()
+        self._write_all(last=False)
 
     def _write(self, line: LogLine, realtime_ns: int) -> None:
         if line.part and line.part not in self._loggers:  # /rosout takes lines of loggers that it knows

@@ -244,7 +244,8 @@ class Recording:
 
     def takes(self, topic: str) -> bool:
         """Whether the topic is recorded as one of other nodes, as it was asked for."""
-        return any(each.full_name == topic for each in self._chosen)
+        received = self._received
+        return received is not None and any(each.full_name == topic for each in received.chosen)
 
     def look(self) -> None:
         """Take topics that patterns take now, and warn of those that do not fit. One thread at a time."""

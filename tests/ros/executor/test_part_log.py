@@ -145,3 +145,19 @@ def test_virtual_time_has_the_instants_of_its_lines(architecture: Path, tmp_path
     assert len(logs) >= 5
     first = f"[DEBUG] [{epoch_ns / 1e9:.6f}] [{LOGGER}.counter]: Count: counted to 1.0 by 1"
     assert console[0] == first
+
+
+def test_a_bag_that_takes_rosout_has_each_line_once(
+    start_executor: Callable[..., Any], architecture: Path, tmp_path: Path, graph: Any
+) -> None:
+    text = architecture.read_text(encoding="utf-8")
+    architecture.write_text(text.replace("priority: 40", "priority: 40, log_level: debug"), encoding="utf-8")
+    heard = graph.hear(Log, "/rosout", KEPT)
+    bag = tmp_path / "bag"
+    topics = ("-p", "record_topics:=['/rosout:rcl_interfaces/msg/Log:transient_local']")
+    executor = start_executor("-p", f"architecture:={architecture}", "-p", f"bag:={bag}", *topics)
+    graph.spin_until(lambda: len(lines_of("counter", heard)) >= 5, "lines of the counter")
+    assert executor.end(signal.SIGINT)[0] == 0
+    texts = [log.msg for log in lines_of("counter", [log for _, log in recorded(bag)])]
+    assert len(texts) >= 5
+    assert len(texts) == len(set(texts))
