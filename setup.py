@@ -25,7 +25,7 @@ ROOT = Path(__file__).resolve().parent
 sys.path.insert(0, str(ROOT / "scripts"))
 from patch_wheels import private_prefix  # noqa: E402
 
-PYTHON_PACKAGES = ("mauve_rt", "mauve_examples", "mauve_msgs")
+PYTHON_PACKAGES = ("mauve_rt", "mauve_examples", "mauve_msgs", "tf2_msgs")
 # What serves the set-up files of workspaces only; some of it names the folder it was built in.
 LEFT_OUT = (
     "bin/mauve",  # an entry point instead, which knows its interpreter

@@ -14,6 +14,7 @@ _NS_PER_US = 1000
 _PACE_NS = 1000
 _RELEASES = ("plain", "shadowed", "waking", "probation")
 _SHADOW_US = 5.0  # 0.5 % of the period; most of it is the system call that wakes the shadow's thread
+_LOOKUP_NS_PER_HOP = 1000
 _ONE_CPU = "this machine has one CPU"
 _COPY = "PI mutex lock + unlock + copy"
 
@@ -111,6 +112,17 @@ def latest_value_rows(settings: Settings) -> Iterator[Row]:
     yield exactly_zero(f"{what}: reads that failed or found halves of two values", bad, note=note)
 
 
+def transform_lookup_rows(settings: Settings) -> Iterator[Row]:
+    """Look up transforms of a TransformTree."""
+    rounds = _rounds("bench_transform_lookup", settings)
+    for hops, plural in ((1, ""), (10, "s")):
+        pairs = _block_pairs(rounds, f"lookup_{hops}", f"map_{hops}")
+        what = f"TransformTree lookup by names, interpolated, {hops} hop{plural}"
+        beside, limit = "two std::map lookups by name", hops * _LOOKUP_NS_PER_HOP
+        yield compared(what, pairs, unit="ns", beside=beside, limit=limit)
+    yield exactly_zero("TransformTree: lookups that failed", [found["failed"] for found in rounds])
+
+
 def activation_rows(settings: Settings) -> Iterator[Row]:
     """Resume a state machine of two states, on no thread."""
     rounds = _rounds("bench_activation", settings)
@@ -122,7 +134,7 @@ def activation_rows(settings: Settings) -> Iterator[Row]:
 
 
 def trace_rows(settings: Settings) -> Iterator[Row]:
-    """Write a trace record."""
+    """Write a trace record, and a log line."""
     rounds = _rounds("bench_trace", settings)
     beside = "clock_gettime"
     note = "a mark on a thread that is not traced; the loop around it included"
@@ -130,6 +142,12 @@ def trace_rows(settings: Settings) -> Iterator[Row]:
     yield compared("trace record, off", off, unit="ns", beside=beside, limit=2, note=note)
     on = _block_pairs(rounds, "on", "clock")
     yield compared("trace record, on", on, unit="ns", beside=beside, ratio_limit=1.6)
+    note = "the arguments copied into the thread's ring; formatted by another thread"
+    kept = _block_pairs(rounds, "log", "on")
+    yield compared("log line with 2 doubles", kept, unit="ns", beside="trace record, on", limit=60, note=note)
+    below = _block_pairs(rounds, "log_off", "clock")
+    note = "below the level of its component; the loop around it included"
+    yield compared("log line below its level", below, unit="ns", beside=beside, limit=2, note=note)
 
 
 def shadow_rows(settings: Settings) -> Iterator[Row]:

@@ -19,7 +19,7 @@ from talkers import Talkers, plugin_prefix
 from mauve_msgs.srv import StartRecording, StopRecording
 from mauve_rt.cli.client import Client, connected
 from mauve_rt.trace.bag.repair import examine_bag
-from mauve_rt.trace.recording.trace_bag import ledger_of
+from mauve_rt.trace.recording.ledger import ledger_of
 
 _TOPICS = 20  # of 1 kHz
 _CLOUDS_HZ = 30  # of 1 MB

@@ -29,6 +29,7 @@ from micro import (
     shadow_rows,
     shared_data_rows,
     trace_rows,
+    transform_lookup_rows,
 )
 from mission import mission_rows
 from native import BenchmarkError
@@ -80,6 +81,7 @@ BENCHMARKS: dict[str, Callable[[Settings], Iterator[Row]]] = {
     "shared-data": shared_data_rows,
     "ring-buffer": ring_buffer_rows,
     "latest-value": latest_value_rows,
+    "transform-lookup": transform_lookup_rows,
     "activation": activation_rows,
     "trace": trace_rows,
     "shadow": shadow_rows,

@@ -6,7 +6,8 @@ import numpy as np
 
 from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.format.records import RECORD, Kind, Records
-from mauve_rt.trace.recording.trace_bag import Drained, TraceBag
+from mauve_rt.trace.recording.sources import Drained
+from mauve_rt.trace.recording.trace_bag import TraceBag
 
 COMPONENTS = ("control", "guidance", "mapping", "planner", "watch")
 _NAMES = ["", "Work", "Rest"]

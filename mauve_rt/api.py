@@ -28,14 +28,23 @@ from mauve_rt._kernel import (
     TraceDrain,
     Transaction,
     TransactionReport,
+    TransformBuffer,
+    TransformLookup,
     monotonic_ns,
 )
 from mauve_rt.model.build import open_architecture
 from mauve_rt.parts.cores import Core
-from mauve_rt.parts.declarations import call_port, event_port, property, read_port, write_port  # noqa: A004
+from mauve_rt.parts.declarations import (
+    call_port,
+    event_port,
+    property,  # noqa: A004
+    read_port,
+    request_port,
+    write_port,
+)
 from mauve_rt.parts.fsms import Fsm, PeriodicFsm, State, times
 from mauve_rt.parts.model_core import ModelCore
-from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, Sample, WritePort
+from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, RequestPort, Sample, WritePort
 from mauve_rt.parts.resources import (
     AnyResource,
     EventCounter,
@@ -43,6 +52,7 @@ from mauve_rt.parts.resources import (
     Resource,
     RingBuffer,
     SharedData,
+    TransformTree,
     parameter,
     read_resource,
     service,
@@ -78,6 +88,7 @@ __all__ = [
     "PropertyDescription",
     "ReadPort",
     "RealtimeStatus",
+    "RequestPort",
     "Resource",
     "ResourceDescription",
     "RingBuffer",
@@ -92,6 +103,9 @@ __all__ = [
     "TraceDrain",
     "Transaction",
     "TransactionReport",
+    "TransformBuffer",
+    "TransformLookup",
+    "TransformTree",
     "WritePort",
     "call_port",
     "event_port",
@@ -102,6 +116,7 @@ __all__ = [
     "property",
     "read_port",
     "read_resource",
+    "request_port",
     "s_to_ns",
     "service",
     "times",

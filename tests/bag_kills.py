@@ -15,15 +15,17 @@ PATIENCE_S = 100.0
 
 
 RECORDING = f"""
+import random
 import sys
 from pathlib import Path
 from mauve_rt.trace.bag.disk import KeptDisk
 from mauve_rt.trace.bag.writer import BagWriter
 disk = KeptDisk(Path(sys.argv[1]), on_error=print)
-bag = BagWriter(Path(sys.argv[2]), disk=disk)
+bag = BagWriter(Path(sys.argv[2]), disk=disk, compression=sys.argv[5])
 size, split_every = int(sys.argv[3]), int(sys.argv[4])
 bag.add_topic("/words", "{TEXT}")
-message = bytes([0, 1, 0, 0]) + size.to_bytes(4, "little") + b"x" * (size - 1) + bytes(1)
+text = random.Random(1).randbytes(size).hex()[: size - 1].encode()  # becomes half of it when compressed
+message = bytes([0, 1, 0, 0]) + size.to_bytes(4, "little") + text + bytes(1)
 print(disk._process, flush=True)
 for number in range(10**9):
     bag.write("/words", number, message)
@@ -47,9 +49,11 @@ def has_ended(process: int) -> bool:
     return True
 
 
-def kill_in_a_write(bag: Path, *, size: int, split_every: int, at: int) -> list[str]:
+def kill_in_a_write(
+    bag: Path, *, size: int, split_every: int, at: int, compression: str = "none"
+) -> list[str]:
     """Kill a process as soon as its file grows again; what it had said."""
-    words = [sys.executable, "-c", RECORDING, KEEPER, bag, str(size), str(split_every)]
+    words = [sys.executable, "-c", RECORDING, KEEPER, bag, str(size), str(split_every), compression]
     with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as child:
         keeper = int(child.stdout.readline())
         for _ in range(at):

@@ -41,7 +41,7 @@ def bag() -> str:
     """The topics that each bag has, and the keys of the custom data."""
     [own] = [
         node
-        for node in tree_of(ROOT / "mauve_rt/node/executor/recording.py").body
+        for node in tree_of(ROOT / "mauve_rt/node/executor/topic_choice.py").body
         if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_OWN"
     ]
     topics = ast.literal_eval(own.value)
@@ -53,7 +53,10 @@ def bag() -> str:
             table(("topic", "type", "contents"), rows),
             "## Keys of the custom data\n",
             "`metadata.yaml` has these keys in its `custom_data`.\n",
-            table(("key", "meaning"), [_key("DROPPED_MESSAGES"), _key("LEDGER")]),
+            table(
+                ("key", "meaning"),
+                [_key("DROPPED_MESSAGES"), _key("LEDGER"), _key("DELETED", "bag.deletion")],
+            ),
             "Each entry of `mauve_topics` has these numbers, in this order:\n",
             table(("number", "meaning"), _ledger()),
         ]
@@ -65,10 +68,10 @@ def _first_sentence(kind: str) -> str:
     return " ".join(head.split()).partition(". ")[0].rstrip(".") + "."
 
 
-def _key(name: str) -> tuple[str, str]:
+def _key(name: str, module_name: str = "recording.ledger") -> tuple[str, str]:
     from _reference.python_api import below  # noqa: PLC0415
 
-    module, nodes = find("mauve_rt.trace.recording.trace_bag", name)
+    module, nodes = find(f"mauve_rt.trace.{module_name}", name)
     [node] = nodes
     assert isinstance(node, ast.Assign)  # noqa: S101 - a constant
     meaning = below(module, nodes).removeprefix("Key in the custom data of metadata.yaml: ")
@@ -76,7 +79,7 @@ def _key(name: str) -> tuple[str, str]:
 
 
 def _ledger() -> list[tuple[str, str]]:
-    [entry] = find("mauve_rt.trace.recording.trace_bag", "Entry")[1]
+    [entry] = find("mauve_rt.trace.recording.ledger", "Entry")[1]
     assert isinstance(entry, ast.ClassDef)  # noqa: S101
     rows = []
     for field, text in zip(entry.body, entry.body[1:], strict=False):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Architectures and their components.
 #include "component.hpp"
+#include "log.hpp"
 #include "transaction.hpp"
 
 namespace mauve::bindings {
@@ -61,10 +62,11 @@ TransactionReport commit_transaction(PyArchitecture& self, const PyTransaction& 
 
 void bind_architecture(py::module_& module) {
   bind_component(module);
-  py::class_<PyArchitecture>(
+  py::class_<PyArchitecture> architecture(
       module, "Architecture",
-      "Components and resources, connected. Parts are classes written in Python or registered names.")
-      .def(py::init<PluginRegistry&>(), py::arg("registry"), py::keep_alive<1, 2>())
+      "Components and resources, connected. Parts are classes written in Python or registered names.");
+  add_log_methods(architecture);
+  architecture.def(py::init<PluginRegistry&>(), py::arg("registry"), py::keep_alive<1, 2>())
       .def(
           "add_component",
           [](const py::object& object, const std::string& name, const AnyShell& shell, const AnyCore& core,

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // mauve_rt._kernel. A signature names the classes of Python that were registered before it: hence the order.
+#include "log.hpp"
 #include "translate.hpp"
 
 PYBIND11_MODULE(_kernel, module) {
@@ -12,13 +13,17 @@ Attributes:
         such an error refuses.
     NOT_MEASURED: In the place of a time that there is not, or not yet.
     STATE_TIMES: What add_component(states=...) takes for each execution state, in words.
+    NO_LOG: Of a part that belongs to no architecture: its lines go nowhere.
     KEPT: Source of overlays of rules that were active before a restart, and that the rules file lacks.
     HELD_STOPPED: Source of overlays that keep components stopped after a restart.
     STOP_TIMEOUT_NS: How long a state may go on after a stop of all components, before its component is given up.
+    TRANSFORM_OUTCOMES: The outcomes of a set or lookup of a transform in words, by the numbers of
+        mauve_msgs/msg/TransformOutcome.
     TASK_SETTINGS: What add_component() takes by keyword, besides `states`.
 )";
   bind_errors(module);
   bind_descriptions(module);
+  bind_log(module);
   bind_python_shell(module);
   bind_python_fsm(module);
   bind_registry(module);
@@ -32,6 +37,7 @@ Attributes:
   bind_architecture(module);
   bind_state_keeper(module);
   bind_value_log(module);
+  bind_transforms(module);
   bind_host(module);
   bind_simulation(module);
   bind_rules(module);

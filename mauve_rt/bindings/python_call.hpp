@@ -61,11 +61,14 @@ bool call_hook(const py::object& object, const char* name);
 
 py::bytes to_bytes(const std::vector<std::byte>& message);
 
-/// What a Python object may still reach of its component; both pointers are read and cleared under the
+/// What a Python object may still reach of its component; its pointers are read and cleared under the
 /// interpreter's lock, so that an object kept longer than its component finds nothing rather than a ruin.
 struct ShellLink {
   Shell* shell{nullptr};
   const Context* context{nullptr};
+  const LogSource* resource_log{nullptr};  // of a resource, which has neither of the others
+
+  const LogSource* log() const noexcept { return context != nullptr ? &context->log : resource_log; }
 };
 
 /// What Python sees of a shell: ports by name, properties, the logical clock.
@@ -73,9 +76,12 @@ class ShellView {
  public:
   explicit ShellView(std::shared_ptr<ShellLink> link) : link_(std::move(link)) {}
 
+  const std::shared_ptr<ShellLink>& link() const noexcept { return link_; }
+
   ReadMessage read(const std::string& name) const;
   bool write(const std::string& name, const py::bytes& data) const;
   py::object call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const;
+  py::bytes request(const std::string& name, const py::bytes& data) const;
   void raise_event(const std::string& name) const;
   py::object property(const std::string& name) const;
   Duration times(std::int64_t factor, const std::string& property) const;

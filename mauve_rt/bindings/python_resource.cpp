@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "python_resource.hpp"
 
+#include "log.hpp"
+
 namespace mauve::bindings {
 
 namespace {
@@ -11,6 +13,8 @@ class PythonResource final : public Resource {
       : Resource(factory.name, "") {
     in_python([&] {
       object_.set(factory.make->get()());
+      link_->resource_log = &log_source();
+      py::setattr(object_.get(), "_log", py::cast(PyLog(link_)));
       for (const auto& [name, value] : parameters) py::setattr(object_.get(), name.c_str(), to_python(value));
       for (const auto& item : object_.get().attr("_services")()) {
         const auto service = item.cast<py::tuple>();
@@ -20,6 +24,10 @@ class PythonResource final : public Resource {
         offer(*services_.back());
       }
     });
+  }
+  ~PythonResource() override {
+    const InterpreterLocked lock;
+    link_->resource_log = nullptr;
   }
 
  protected:
@@ -32,6 +40,7 @@ class PythonResource final : public Resource {
 
  private:
   PythonObject object_;
+  std::shared_ptr<ShellLink> link_{std::make_shared<ShellLink>()};
   std::vector<std::unique_ptr<PythonService>> services_;
 };
 

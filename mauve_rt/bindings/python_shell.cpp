@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // Shells written in Python, and what Python objects see of the shell of their component.
+#include "log.hpp"
 #include "python_call.hpp"
 #include "python_resource.hpp"
+#include "request_port.hpp"
 #include "serialized.hpp"
 
 namespace mauve::bindings {
@@ -52,6 +54,9 @@ class ShellBuilder {
   void call_port(const std::string& name, const std::string& type) {
     shell_.add_port(std::make_unique<PythonCallPort>(name, type));
   }
+  void request_port(const std::string& name, const std::string& type) {
+    shell_.add_port(std::make_unique<RequestPort>(name, type));
+  }
   void event_port(const std::string& name, bool optional) {
     EventPort& port = shell_.event_port(name);
     if (optional) port.make_optional();
@@ -91,7 +96,7 @@ class ShellBuilder {
 }  // namespace
 
 PythonShell::PythonShell(const PartFactory& factory, const PluginRegistry& registry)
-    : link_(std::make_shared<ShellLink>(ShellLink{this, nullptr})) {
+    : link_(std::make_shared<ShellLink>(ShellLink{.shell = this})) {
   set_implementation(factory.name);
   in_python([&] {
     object_.set(factory.make->get()());
@@ -154,6 +159,18 @@ py::object ShellView::call(const std::string& name, const py::args& args, const 
   return port->call(args, kwargs);
 }
 
+py::bytes ShellView::request(const std::string& name, const py::bytes& data) const {
+  auto* port = dynamic_cast<RequestPort*>(&require_port(name, PortKind::call));
+  if (port == nullptr) throw py::type_error("call port '" + name + "' takes no requests");
+  const std::string_view message = data;
+  std::vector<std::byte> response;
+  {
+    const InterpreterUnlocked release;
+    response = port->call(as_bytes_view(message));
+  }
+  return to_bytes(response);
+}
+
 void ShellView::raise_event(const std::string& name) const {
   auto& port = dynamic_cast<EventPort&>(require_port(name, PortKind::event));
   const InterpreterUnlocked release;
@@ -209,6 +226,8 @@ Raises MauveError (not_configured) once the component is gone.)")
            "(message, 0 none - 1 old - 2 new, writer's time in ns).")
       .def("write", &ShellView::write, py::arg("port"), py::arg("data"), "False when there was no room.")
       .def("call", &ShellView::call, py::arg("port"), "Calls a service in Python.")
+      .def("request", &ShellView::request, py::arg("port"), py::arg("data"),
+           "Calls a service in C++; the response.")
       .def("raise_event", &ShellView::raise_event, py::arg("port"))
       .def("property", &ShellView::property, py::arg("name"), "The value in force.")
       .def("times", &ShellView::times, py::arg("factor"), py::arg("property"),
@@ -217,6 +236,8 @@ Raises MauveError (not_configured) once the component is gone.)")
       .def("properties", &ShellView::properties)
       .def("clock", &ShellView::clock, "The component's logical clock, ns of CLOCK_MONOTONIC.")
       .def("period", &ShellView::period, "The component's period g in ns.")
+      .def(
+          "log", [](const ShellView& self) { return PyLog(self.link()); }, "Lines of the component.")
       .def("python", &ShellView::python, "The shell's own object, when it is written in Python.")
       .def("implementation", &ShellView::implementation);
   py::class_<ShellBuilder>(
@@ -227,6 +248,7 @@ Raises MauveError (not_configured) once the component is gone.)")
       .def("write_port", &ShellBuilder::write_port, py::arg("name"), py::arg("type"), py::arg("zero"),
            py::arg("on_commit"), py::arg("on_stop"), py::arg("optional") = false)
       .def("call_port", &ShellBuilder::call_port, py::arg("name"), py::arg("type"))
+      .def("request_port", &ShellBuilder::request_port, py::arg("name"), py::arg("type"))
       .def("event_port", &ShellBuilder::event_port, py::arg("name"), py::arg("optional") = false)
       .def("property", &ShellBuilder::property, py::arg("name"), py::arg("value"), py::arg("unit"),
            py::arg("description"), py::arg("minimum"), py::arg("maximum"), py::arg("structural"));

@@ -37,6 +37,8 @@ void bind_reports(py::module_& module);
 /// Registers Host and Deployer.
 void bind_host(py::module_& module);
 void bind_value_log(py::module_& module);
+/// Registers TransformBuffer.
+void bind_transforms(py::module_& module);
 /// Registers Transaction and its reports.
 void bind_transaction(py::module_& module);
 void bind_probation(py::module_& module);

@@ -144,8 +144,10 @@ def _repair(args: argparse.Namespace) -> int:
     with shown() as progress:
         state = examine_bag(bag, progress=progress)
         repair_bag(state)
-    if state.is_finished:
+    if state.is_finished and not state.removed:
         print(f"{bag}: nothing to repair")
+    for path in state.removed:
+        print(f"deleted: {path.name}, which max_size_bytes had removed from the bag")
     for damage in state.damages():
         print(f"repaired: {damage}")
     return OK

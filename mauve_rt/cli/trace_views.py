@@ -10,6 +10,7 @@ from rich.table import Table
 
 from mauve_rt.cli.tables import number_table
 from mauve_rt.counts import counted
+from mauve_rt.trace.bag.deletion import Deleted
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.statistics import ComponentStatistics, Distribution
 from mauve_rt.trace.reading.trace import Trace
@@ -35,6 +36,7 @@ def info_values(trace: Trace) -> dict[str, Any]:
         ],
         "recorded": datetime.fromtimestamp(realtime_ns / 1e9, UTC).isoformat(timespec="seconds"),
         "clock_steps": [step.text for step in trace.clock_steps],
+        "deleted": [one._asdict() for one in trace.deleted],
         "duration_s": (end_ns - begin_ns) / 1e9,
         "records": sum(loss.received for loss in trace.losses.values()),
         "lost": trace.lost,
@@ -60,7 +62,8 @@ def info_view(values: Mapping[str, Any]) -> Group:
     topics = number_table(["topic"], ["type"], ["messages"])
     for name, topic in values["topics"].items():
         topics.add_row(escape(name), escape(topic["type"]), f"{topic['messages']:,}")
-    notes = [*(f"[red]{escape(line)}" for line in damages), *map(escape, values["clock_steps"])]
+    deleted = [Deleted(**fields).text for fields in values["deleted"]]
+    notes = [*(f"[red]{escape(line)}" for line in damages), *map(escape, [*deleted, *values["clock_steps"]])]
     return Group(escape(head), *notes, components, topics)
 
 

@@ -2,7 +2,6 @@
 
 import argparse
 import sys
-import time
 from typing import Any
 
 from mauve_rt.cli import (
@@ -15,10 +14,12 @@ from mauve_rt.cli import (
     echo_verb,
     generate_verb,
     graph_verb,
+    log_level_verb,
     mirror_verb,
     model_verb,
     new_verb,
     plugins_verb,
+    record_verb,
     report_verb,
     rules_verb,
     run_verb,
@@ -33,35 +34,17 @@ from mauve_rt.cli.completion import (
     complete_components,
     complete_cores,
     complete_properties,
-    complete_values,
     completed_by,
 )
+from mauve_rt.cli.request import add_request_fields, send_request
 from mauve_rt.cli.verb import BAD_USAGE, OK, Verb
 from mauve_rt.errors import ArchitectureFileError
-
-_LOOK_S = 0.02  # between two looks at what a change cost
 
 
 def _add_request(parser: argparse.ArgumentParser) -> None:
     add_executor_and_json(parser)
     completed_by(parser.add_argument("component", help="name of the component"), complete_components)
-    _add_record(parser)
-
-
-def _add_record(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--cause", default="", help="reason of the request, for the log and the bag")
-    parser.add_argument(
-        "--request-id",
-        default="",
-        help="id of the request: a second request with it returns the first outcome",
-    )
-    parser.add_argument(
-        "--expected-revision",
-        type=int,
-        default=0,
-        metavar="N",
-        help="refuse unless the architecture has revision N (see mauve list)",
-    )
+    add_request_fields(parser)
 
 
 def _add_timed_request(parser: argparse.ArgumentParser) -> None:
@@ -200,7 +183,7 @@ def _add_reconfigure(parser: argparse.ArgumentParser) -> None:
     add_executor_and_json(parser)
     parser.add_argument("file", help="YAML list of steps {kind, target, name, value}; - for standard input")
     parser.add_argument("--dry-run", action="store_true", help="check and prepare everything, change nothing")
-    _add_record(parser)
+    add_request_fields(parser)
     _add_timeout(parser)
     _add_force(parser)
     _add_idle(parser)
@@ -223,7 +206,7 @@ def _add_reload(parser: argparse.ArgumentParser) -> None:
         "--dry-run", action="store_true", help="try and check the new code in a process of its own only"
     )
     _add_probation(parser)
-    _add_record(parser)
+    add_request_fields(parser)
     _add_timeout(parser)
     _add_force(parser)
     _add_phase_timeout(parser)
@@ -234,7 +217,7 @@ def _add_set(parser: argparse.ArgumentParser) -> None:
     name = parser.add_argument("property", type=_property, help="COMPONENT.PROPERTY, e.g. control.max_speed")
     completed_by(name, complete_properties)
     parser.add_argument("value", help="the new value, as in an architecture file")
-    _add_record(parser)
+    add_request_fields(parser)
     _add_timeout(parser)
     _add_over_and_base(parser)
 
@@ -269,19 +252,19 @@ def _stop(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Stop  # noqa: PLC0415
 
     fields = {"component": args.component, "timeout_s": args.timeout, "force": args.force}
-    return _request(args, Stop, "stop", **fields)
+    return send_request(args, Stop, "stop", **fields)
 
 
 def _start(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Start  # noqa: PLC0415
 
-    return _request(args, Start, "start", component=args.component, over=_over(args))
+    return send_request(args, Start, "start", component=args.component, over=_over(args))
 
 
 def _replace_core(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import ReplaceCore  # noqa: PLC0415
 
-    return _request(
+    return send_request(
         args,
         ReplaceCore,
         "replace_core",
@@ -307,7 +290,7 @@ def _reconfigure(args: argparse.Namespace) -> int:
     except ArchitectureFileError as error:
         print("\n".join(error.lines()), file=sys.stderr)
         return BAD_USAGE
-    return _request(
+    return send_request(
         args,
         Reconfigure,
         "reconfigure",
@@ -327,7 +310,7 @@ def _reconfigure(args: argparse.Namespace) -> int:
 def _reload(args: argparse.Namespace) -> int:
     from mauve_msgs.srv import Reload  # noqa: PLC0415
 
-    return _request(
+    return send_request(
         args,
         Reload,
         "reload",
@@ -347,29 +330,7 @@ def _set(args: argparse.Namespace) -> int:
     component, name = args.property
     step = ReconfigurationStep(kind="set_property", target=component, name=name, value=args.value)
     fields = {"steps": [step], "commit_timeout_s": args.timeout, **_over_of(args)}
-    return _request(args, Reconfigure, "reconfigure", **fields)
-
-
-def _request(args: argparse.Namespace, service_type: Any, name: str, **fields: Any) -> int:
-    from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.cli.views import is_incomplete, print_reply, report_lines  # noqa: PLC0415
-
-    request = service_type.Request(
-        request_id=args.request_id,
-        expected_revision=max(args.expected_revision, 0),
-        requested_by="mauve",
-        cause=args.cause,
-        **fields,
-    )
-    with connected(first=True) as client:
-        reply = client.call(service_type, f"{args.executor}/{name}", request)
-        # Who repeats a request gets its outcome, with the releases that came meanwhile.
-        until_s = time.monotonic() + getattr(args, "phase_timeout", 0.0)
-        while is_incomplete(reply) and time.monotonic() < until_s:
-            time.sleep(_LOOK_S)
-            reply = client.call(service_type, f"{args.executor}/{name}", request)
-    lines = [*getattr(reply, "loaded", ()), *report_lines(reply.report)]
-    return print_reply(reply, as_json=args.json, lines=lines)
+    return send_request(args, Reconfigure, "reconfigure", **fields)
 
 
 def _nodes(args: argparse.Namespace) -> int:
@@ -406,70 +367,6 @@ def _events(args: argparse.Namespace) -> int:
     except KeyboardInterrupt:
         pass
     return OK
-
-
-def _add_recording(parser: argparse.ArgumentParser) -> None:
-    actions = parser.add_subparsers(title="actions", metavar="start|stop", required=True)
-    start = actions.add_parser("start", help="start a recording into a new bag")
-    stop = actions.add_parser("stop", help="end the recording and complete the bag")
-    start.set_defaults(starts=True)
-    stop.set_defaults(starts=False)
-    for action in (start, stop):
-        add_executor_and_json(action)
-    start.add_argument(
-        "bag",
-        nargs="?",
-        default="",
-        help="folder of the bag, below the executor's parameter `bags` (default: named by the time)",
-    )
-    start.add_argument(
-        "--topic",
-        action="append",
-        default=[],
-        metavar="NAME[:TYPE[:QOS]]",
-        help="record this topic too; may be repeated",
-    )
-    values = start.add_argument(
-        "--value",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="record every write to this resource, or COMPONENT.PORT, too; may be repeated",
-    )
-    completed_by(values, complete_values)
-    start.add_argument(
-        "--split-s",
-        type=float,
-        default=0.0,
-        metavar="S",
-        help="seconds until the bag goes on in a new file (default 60)",
-    )
-    start.add_argument(
-        "--split-mb",
-        type=float,
-        default=0.0,
-        metavar="MB",
-        help="size at which the bag goes on in a new file (default: no limit)",
-    )
-    for action in (start, stop):
-        _add_record(action)
-
-
-def _recording(args: argparse.Namespace) -> int:
-    from mauve_msgs.srv import StartRecording, StopRecording  # noqa: PLC0415
-
-    if not args.starts:
-        return _request(args, StopRecording, "stop_recording")
-    return _request(
-        args,
-        StartRecording,
-        "start_recording",
-        bag=args.bag,
-        topics=args.topic,
-        values=args.value,
-        split_s=args.split_s,
-        split_bytes=max(round(args.split_mb * 1e6), 0),
-    )
 
 
 def _add_json(parser: argparse.ArgumentParser) -> None:
@@ -537,9 +434,20 @@ VERBS = (
     ),
     Verb("set", "set a property of a component", _add_set, _set),
     Verb("echo", "show the values of a resource or port", echo_verb.add_arguments, echo_verb.main),
+    Verb(
+        "log-level",
+        "set the level from which on log lines of a component are kept",
+        log_level_verb.add_arguments,
+        log_level_verb.main,
+    ),
     Verb("mirror", "publish a value on a ROS topic", mirror_verb.add_arguments, mirror_verb.main),
     Verb("watch", "show a live table of executors", watch_verb.add_arguments, watch_verb.main),
-    Verb("record", "start or stop a recording of an executor", _add_recording, _recording),
+    Verb(
+        "record",
+        "start or stop a recording of an executor",
+        record_verb.add_arguments,
+        record_verb.main,
+    ),
     Verb(
         "report",
         "write a report of a recorded run as one HTML page",

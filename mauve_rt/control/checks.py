@@ -8,6 +8,7 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import LONGEST_IDLE_S, Step
+from mauve_rt.trace.bag.recorded import COMPRESSIONS, FILES_OF_A_BAG, Split
 
 MAX_TIMEOUT_S = 10.0
 MAX_TEXT = 1000
@@ -104,8 +105,8 @@ def _check_rule(request: Request) -> None:
 
 
 def _check_recording(order: RecordingOrder) -> None:
-    texts = [order.bag, *order.topics, *order.values]
-    many = max(len(order.topics), len(order.values))
+    texts = [order.bag, *order.topics, *order.topic_regexes, *order.values]
+    many = max(len(order.topics) + len(order.topic_regexes), len(order.values))
     if many > MAX_TOPICS or any(len(text) > MAX_TEXT for text in texts):
         what = f"{MAX_TOPICS} topics and {MAX_TOPICS} values"
         text = f"expected at most {what}, and no text longer than {MAX_TEXT} characters"
@@ -118,6 +119,15 @@ def _check_recording(order: RecordingOrder) -> None:
     if order.split_bytes != 0 and order.split_bytes < MIN_SPLIT_BYTES:
         text = f"bad split_bytes: expected 0 (any size) or at least {MIN_SPLIT_BYTES:,}"
         raise RefusalError(Code.INVALID, f"{text}, found {order.split_bytes:,}")
+    if order.compression not in ("", *COMPRESSIONS):
+        text = f"bad compression: expected {' or '.join(COMPRESSIONS)}, found {shown(order.compression)}"
+        raise RefusalError(Code.INVALID, text)
+    if order.max_size_bytes != 0:
+        split = Split(after_bytes=order.split_bytes, max_bytes=order.max_size_bytes)
+        least = f"expected 0 (no limit) or at least {FILES_OF_A_BAG * MIN_SPLIT_BYTES:,} bytes"
+        small = f"{least}, found {split.max_bytes:,}" if split.file_bytes < MIN_SPLIT_BYTES else ""
+        if misfit := small or split.misfit():
+            raise RefusalError(Code.INVALID, f"bad max_size_bytes: {misfit}")
 
 
 def check_state(step: Step, component: ComponentDescription) -> None:

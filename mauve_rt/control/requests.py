@@ -74,14 +74,17 @@ class RecordingOrder:
     start: bool
     bag: str = ""
     topics: tuple[str, ...] = ()
+    topic_regexes: tuple[str, ...] = ()
     values: tuple[str, ...] = ()
     split_s: float = 0.0  # 0: the default
     split_bytes: int = 0
+    max_size_bytes: int = 0  # 0: no limit
+    compression: str = ""  # empty: none
 
     def __str__(self) -> str:
         words = "stop_recording"
         if self.start:
-            words = " ".join(("start_recording", self.bag, *self.topics, *self.values))
+            words = " ".join(("start_recording", self.bag, *self.topics, *self.topic_regexes, *self.values))
         return cut(words.strip(), _LONGEST_WORDS)
 
 
@@ -156,7 +159,8 @@ class Request:
         for step in self.steps:
             yield from (step.kind, step.target, step.name, step.value)
         if self.recording is not None:
-            yield from (self.recording.bag, *self.recording.topics, *self.recording.values)
+            order = self.recording
+            yield from (order.bag, *order.topics, *order.topic_regexes, *order.values)
         if self.reload is not None:
             yield from (*self.reload.targets, self.reload.probation)
 

@@ -13,6 +13,7 @@ from mauve_rt._kernel import (
     ComponentDescription,
     Deployer,
     Host,
+    LogEntries,
     Overlays,
     PluginRegistry,
     ProbationRecord,
@@ -68,6 +69,7 @@ class Runtime:
     | member        | written by                                 | guarded by      |
     | ------------- | ------------------------------------------ | --------------- |
     | `_revision` ...  | observe(): any thread                      | `_lock`         |
+    | `_left_log`   | configure(), cleanup(), take_log()         | `_lock`         |
     | `_declared`   | configure(), and who is in loading()       | exchanged whole |
     | `_changing`, `_unchanging` | who is in changing(): one at a time | itself    |
     | `registry`, `index` | configure(), and who is in loading() | `_loading`; exchanged whole |
@@ -98,6 +100,7 @@ class Runtime:
         self._claimed = 0  # the last revision that a request's own change was counted by
         self._seen: object = None
         self._observed = Observed(0, [])
+        self._left_log: list[LogEntries] = []  # of architectures that are gone
         self._mark: object = None  # by which the kernel tells whether there is anything new to be seen
 
     # ---- life cycle
@@ -128,13 +131,18 @@ class Runtime:
             self.registry, self.index = model.parts.registry, model.parts.index
         with self._loading:
             architecture = build(model, self.registry, index=self.index)
-        configure(model, architecture)
+        try:
+            configure(model, architecture)
+        except BaseException:
+            self._keep_log(architecture)
+            raise
         require_realtime = self._require_realtime or model.require_realtime
         host = self._make_host(architecture, require_realtime=require_realtime)
         try:
             host.prepare_process()
         except BaseException:
             architecture.cleanup()
+            self._keep_log(architecture)
             raise
         with self.loading() as loader:
             self._declared = self._with_cores(model.components, loader)
@@ -187,6 +195,20 @@ class Runtime:
         self._mark = None
         if architecture is not None:
             architecture.cleanup()
+            self._keep_log(architecture)
+
+    def _keep_log(self, architecture: Architecture) -> None:
+        entries = architecture.take_log()
+        with self._lock:
+            self._left_log.append(entries)
+
+    def take_log(self) -> list[LogEntries]:
+        """The log lines since the last call, also of an architecture that is gone. One thread at a time."""
+        architecture = self._architecture
+        present = [architecture.take_log()] if architecture is not None else []
+        with self._lock:
+            left, self._left_log = self._left_log, []
+        return [*left, *present]
 
     def require_parked(self) -> None:
         """Whether cleanup() may be called.

@@ -68,6 +68,9 @@ def configure(model: ArchitectureModel, architecture: Architecture) -> None:
     Raises:
         ArchitectureFileError: a component or resource refused; the architecture is unconfigured.
     """
+    for name, resource in model.resources.items():
+        if resource.log_level is not None:
+            architecture.set_log_level(name, resource.log_level)
     with _errors_at(model):
         architecture.configure()
 

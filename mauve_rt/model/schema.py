@@ -399,11 +399,23 @@ class ResourceModel(Section):
         default=None,
     )
 
+    log_level: Literal["debug", "info", "warn", "error", "fatal"] | None = setting(
+        Choice(*TASK_SETTINGS["log_level"].choices),
+        "level from which on log lines of the resource are kept; info without it",
+        default=None,
+    )
+
     @property
     def parameters(self) -> Mapping[str, Any]:
         """Those of its kind that it is told; of a plug-in's kind as the file has them, whatever they are."""
         told: Mapping[str, Any] = vars(self)["_parameters"]
         return told
+
+    def parameter(self, name: str) -> Any:
+        """The parameter of a given kind, or its initial value; None: the kind has no such parameter."""
+        kind = given_kinds().get(self.kind)
+        initial = {each.name: each.initial for each in kind.parameters} if kind is not None else {}
+        return self.parameters.get(name, initial.get(name))
 
     @property
     def topic_type(self) -> str:
@@ -509,6 +521,9 @@ class ComponentModel(Section):
     deadline_ns: int | None = kernel_setting(
         "deadline_ns",
         "deadline of a job after its release, for the timing analysis; without the key the next instant",
+    )
+    log_level: Literal["debug", "info", "warn", "error", "fatal"] = kernel_setting(
+        "log_level", "level from which on log lines of the component are kept"
     )
     enforce_wcet: bool = kernel_setting(
         "enforce_wcet", "fault the component when an execution uses more CPU time than its wcet_ns"

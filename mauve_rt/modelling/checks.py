@@ -18,13 +18,14 @@ _RESERVED_OF_SHELLS = frozenset(
     """
     ports properties find_port find_property set_context set_bytes bytes configure cleanup description
     implementation read_port write_port call_port event_port add_port property clock_ns period_ns
+    log
     """.split()  # noqa: SIM905
 )
 """Members of every shell: no port or property has one of these names."""
 _RESERVED = frozenset(
     """
     shell configure_hook cleanup_hook adopt take state_fields budget_ns clock_ns period_ns accepts configure
-    cleanup description implementation
+    cleanup description implementation log
     """.split()  # noqa: SIM905 - a list would have a line for each
 )
 """Methods of every core: no action or guard has one of these names."""

@@ -23,7 +23,7 @@ is a plain `Core`; list it in the package's `mauve_rt_plugins` (see `mauve_rt.mo
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, get_args
 
-from mauve_rt._kernel import PartFactory, ShellView
+from mauve_rt._kernel import Log, PartFactory, ShellView
 from mauve_rt.errors import PortTypeError
 from mauve_rt.parts.message_types import is_message
 from mauve_rt.parts.part import Configurable, implementation_name
@@ -70,6 +70,11 @@ class Core(Configurable, Generic[ShellT]):
             shells = [shell for shell in get_args(base)[:1] if isinstance(shell, type)]
             if shells and issubclass(shells[0], Shell):
                 cls._shell_class = shells[0]
+
+    def log(self) -> Log:
+        """Lines for the console, /rosout and the bag: `self.log().warn("tracking error {} m", error)`."""
+        log: Log = self.shell.log()
+        return log
 
     def adopt(self, old: Any) -> bool | None:
         """Look whether to take over from `old`, and copy what is small; False or raising refuses.

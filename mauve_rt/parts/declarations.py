@@ -12,10 +12,19 @@ A type is a class of ROS messages, or a name such as "geometry_msgs/msg/Point".
 from collections.abc import Callable, Collection
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
-from mauve_rt.parts.ports import CallPort, EventPort, OutputPolicy, PartName, Property, ReadPort, WritePort
+from mauve_rt.parts.ports import (
+    CallPort,
+    EventPort,
+    OutputPolicy,
+    PartName,
+    Property,
+    ReadPort,
+    RequestPort,
+    WritePort,
+)
 from mauve_rt.parts.resources import service_type
 
-__all__ = ["call_port", "event_port", "property", "read_port", "write_port"]
+__all__ = ["call_port", "event_port", "property", "read_port", "request_port", "write_port"]
 
 T = TypeVar("T")
 V = TypeVar("V", bound=bool | int | float | str)
@@ -46,6 +55,11 @@ def call_port(service: str) -> CallPort[..., Any]: ...
 def call_port(service: Callable[..., Any] | str) -> CallPort[..., Any]:
     """A port that calls a service of a resource in Python: the service's type, or the method that is one."""
     return CallPort(service if isinstance(service, str) else service_type(service))
+
+
+def request_port(service: Any) -> RequestPort:
+    """A port that calls a service of a resource in C++: a class of a ROS service."""
+    return RequestPort(service)
 
 
 def event_port(*, optional: bool = False) -> EventPort:

@@ -4,7 +4,7 @@ from typing import Any
 
 from mauve_rt.parts.message_types import is_promised, message_class
 
-__all__ = ["deserialize", "message_class", "serialize", "type_name", "zero"]
+__all__ = ["deserialize", "message_class", "serialize", "service_name", "type_name", "zero"]
 
 
 _EMPTY = b"\0\1\0\0"  # CDR's header alone
@@ -22,6 +22,18 @@ def type_name(type_or_name: Any) -> str:
         raise TypeError(f"expected a class of ROS messages or a type's name, found {type_or_name!r}")
     package = type_or_name.__module__.partition(".")[0]
     return f"{package}/msg/{type_or_name.__name__}"
+
+
+def service_name(service: Any) -> str:
+    """`std_srvs/srv/SetBool` of that class.
+
+    Raises:
+        TypeError: no class of a ROS service.
+    """
+    if not isinstance(service, type) or not hasattr(service, "Request") or not hasattr(service, "Response"):
+        raise TypeError(f"expected a class of a ROS service, found {service!r}")
+    package = service.__module__.partition(".")[0]
+    return f"{package}/srv/{service.__name__}"
 
 
 def zero(name: str) -> bytes | None:

@@ -20,6 +20,7 @@ __all__ = [
     "OutputPolicy",
     "Property",
     "ReadPort",
+    "RequestPort",
     "Sample",
     "Status",
     "WritePort",
@@ -182,6 +183,31 @@ class CallPort(Member, Generic[P, R]):
         """
         answer: R = self._shell.call(self.name, *args, **kwargs)
         return answer
+
+
+class RequestPort(Member):
+    """A port that calls a service of a resource written in C++, by the messages of a ROS service."""
+
+    def __init__(self, service: Any) -> None:
+        super().__init__()
+        self.type = messages.service_name(service)
+        self._service = service
+
+    def declare(self, builder: ShellBuilder) -> None:
+        """Tell the kernel."""
+        builder.request_port(self.name, self.type)
+
+    def __call__(self, request: Any) -> Any:
+        """Call the service, traced; the response.
+
+        Raises:
+            MauveError: not connected, or not answered.
+            TypeError: a request of another type.
+        """
+        if not isinstance(request, self._service.Request):
+            raise TypeError(f"port '{self.name}': expected {self.type}.Request, found {request!r}")
+        data = self._shell.request(self.name, messages.serialize(request))
+        return messages.deserialize(data, self._service.Response)
 
 
 class EventPort(Member):

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, Generic, Self, TypeVar, overload
 
-from mauve_rt._kernel import DataResource, Host, PartFactory, ResourceParameter
+from mauve_rt._kernel import NO_LOG, DataResource, Host, Log, PartFactory, ResourceParameter
 from mauve_rt.parts import messages
 from mauve_rt.parts.part import Configurable, implementation_name
 from mauve_rt.parts.ports import Sample
@@ -18,6 +18,7 @@ __all__ = [
     "Resource",
     "RingBuffer",
     "SharedData",
+    "TransformTree",
     "parameter",
     "read_resource",
     "service",
@@ -133,6 +134,12 @@ class AnyResource(ABC):
 class Resource(Configurable, AnyResource):
     """Base of resources written in Python; its methods marked by `service` are what ports connect to."""
 
+    _log: Log = NO_LOG
+
+    def log(self) -> Log:
+        """Lines of this resource, also those of its services on the threads of components."""
+        return self._log
+
     @classmethod
     def _part(cls) -> PartFactory:
         return PartFactory("resource", implementation_name(cls), cls)
@@ -218,6 +225,17 @@ class EventCounter(DataOfKind[int]):
 
     def __init__(self) -> None:
         super().__init__("event", "")
+
+
+class TransformTree(DataOfKind[Any]):
+    """The frames of a robot: at most `frames` (64), with the latest `history` (256) transforms of each.
+
+    Its services `set` and `lookup` are called by `request_port(SetTransform)` and
+    `request_port(LookupTransform)`, of `mauve_msgs.srv`.
+    """
+
+    def __init__(self, *, frames: int | None = None, history: int | None = None) -> None:
+        super().__init__("transform_tree", "", **_told(frames=frames, history=history))
 
 
 def _capacities(capacities: Mapping[str, int] | None) -> dict[str, int]:

@@ -3,7 +3,7 @@
 import copy
 from typing import Any, Self
 
-from mauve_rt._kernel import PartFactory, ShellBuilder, ShellView, monotonic_ns
+from mauve_rt._kernel import NO_LOG, Log, PartFactory, ShellBuilder, ShellView, monotonic_ns
 from mauve_rt.parts.part import Configurable, implementation_name
 from mauve_rt.parts.ports import CallPort, EventPort, Member, Property, ReadPort, WritePort
 
@@ -42,6 +42,10 @@ class Shell(Configurable):
     def period_ns(self) -> int:
         """The component's period; 0 before it is configured."""
         return 0 if self._view is None else self._view.period()
+
+    def log(self) -> Log:
+        """Lines for the console, /rosout and the bag: `self.log().warn("tracking error {} m", error)`."""
+        return NO_LOG if self._view is None else self._view.log()
 
     @classmethod
     def _part(cls) -> PartFactory:

@@ -1,5 +1,6 @@
 """An executor in virtual time: topics, ~/state, ~/events, requests and the bag, without node and threads."""
 
+import sys
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from mauve_rt._kernel import ComponentDescription, Simulation
 from mauve_rt.control.control import Control
 from mauve_rt.control.faults import FaultWatch
+from mauve_rt.control.part_log import LogBundles
 from mauve_rt.control.probations import ProbationWatch
 from mauve_rt.control.recorded_values import RecordedValues, choose
 from mauve_rt.control.requests import Outcome, Request
@@ -21,6 +23,7 @@ from mauve_rt.interfaces.descriptions import (
     resource_infos,
     trace_architecture,
 )
+from mauve_rt.interfaces.log_messages import LOG_TYPE, ROSOUT, log_message, logger_name
 from mauve_rt.interfaces.qos import qos_profile, recorded_qos
 from mauve_rt.interfaces.recorded_shadows import RecordedShadows
 from mauve_rt.interfaces.told_decisions import DECISION_TYPE, Done
@@ -29,7 +32,7 @@ from mauve_rt.model.schema import ResourceModel, TopicModel
 from mauve_rt.model.threads import uses_of
 from mauve_rt.simulation.messages import serialize
 from mauve_rt.simulation.rules import DECISIONS_QOS, SimulatedRules
-from mauve_rt.simulation.topics import Sample, SimulatedTopics, resolved, stamp
+from mauve_rt.simulation.topics import S, Sample, SimulatedTopics, resolved, stamp
 from mauve_rt.supervision.rule_actions import rule_actions
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.trace.bag.recorded import SentMessage
@@ -37,6 +40,11 @@ from mauve_rt.trace.recording.trace_bag import TraceBag
 
 _STATE_QOS = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 _EVENT_QOS = QoSProfile(depth=100)
+_ROSOUT_QOS = QoSProfile(depth=1000)
+
+
+def _to_stderr(line: str) -> None:
+    sys.stderr.write(f"{line}\n")
 
 
 class _Outgoing(NamedTuple):
@@ -56,10 +64,12 @@ class SimulatedExecutor:
         bag: Path,
         *,
         complain: Callable[[str], None],
+        console: Callable[[str], None] = _to_stderr,
         rules: Path | None = None,
     ) -> None:
         """Configure the architecture; it joins the simulation, which is not deployed yet.
 
+        `console`: takes the log lines of components and resources.
         `rules`: a rules file, of which it runs those that are `in: executor`.
 
         Raises:
@@ -87,6 +97,8 @@ class SimulatedExecutor:
         self._received: Counter[str] = Counter()  # by topic
         self._refused: Counter[str] = Counter()
         self._architecture = b""
+        self._log = LogBundles()
+        self._console = console
         self._bag = TraceBag(self._runtime.host, bag, node_name=self.name, on_error=complain)
         self._values = RecordedValues(self._runtime, choose(self._runtime, model.recorded, self.name))
         self._values.keep_messages(on=True)
@@ -194,6 +206,7 @@ class SimulatedExecutor:
 
     def record(self) -> None:
         """Move the trace and the messages since the last call into the bag."""
+        self._write_log()
         waiting, self._waiting = self._waiting, []
         waiting += [*self._values.take_messages(), *self._shadows.take_messages()]
         drain = self._runtime.host.drain_trace()
@@ -203,6 +216,16 @@ class SimulatedExecutor:
         self._refused += self._bag.write(drain, waiting, whole=True)
         self._bag.tell_ledger(self._received, self._refused)
         self._bag.tell_dropped(self._refused.total() + self._values.dropped_messages())
+
+    def _write_log(self, *, last: bool = False) -> None:
+        now_ns = self._simulation.now_ns()
+        for line in self._log.take(self._runtime.take_log(), now_ns=now_ns, last=last):
+            name = logger_name(self.name, line.part)
+            self._console(f"[{line.level.upper()}] [{line.time_ns / S:.6f}] [{name}]: {line.text}")
+            message = log_message(line, node=self.name, stamp=stamp(line.time_ns))
+            sample = Sample(ROSOUT, LOG_TYPE, serialize(message), line.time_ns, _ROSOUT_QOS)
+            self._keep(sample)
+            self._topics.publish(sample)
 
     def flush(self) -> None:
         """Make the bag a finished one of what was recorded; waits for the disk."""
@@ -214,6 +237,7 @@ class SimulatedExecutor:
         self._runtime.deactivate()
         self.carry()
         self.refresh()
+        self._write_log(last=True)
         self.record()
         self._values.keep_messages(on=False)
         self._bag.close()

@@ -196,6 +196,7 @@ struct Counter : mauve::Core<CounterShell> {
     }
     count += shell().step.value();
     shell().count.write({count});
+    log().debug("counted to {:.1f} by {}", count, shell().step.value());
   }
   void take(mauve::CoreBase& old) noexcept override {
     if (auto* other = dynamic_cast<Counter*>(&old)) count = other->count;
@@ -259,7 +260,10 @@ struct Unspeakable : Counter {
 
 struct Unready : Counter {
  protected:
-  bool configure_hook() override { throw std::runtime_error("the core is not ready, and never will be"); }
+  bool configure_hook() override {
+    log().error("nothing is there to get ready with");
+    throw std::runtime_error("the core is not ready, and never will be");
+  }
 };
 
 /// Allocates four times an activation, as careless code does.

@@ -35,6 +35,7 @@ class PyCounter(Core):
             self.count = sample.value.data
         self.count += 100.0 * self.shell.step.value
         self.shell.count.write(Float64(data=self.count))
+        self.log().debug("counted to {:.1f} by {}", self.count, "hundreds")
 
 
 class PyTimed(PyCounter):

@@ -26,8 +26,16 @@ PAGES_OF_CLAIMS = (
     *(
         f"docs/howto/{name}.md"
         for name in (
-            *("compare_in_shadow", "install", "operate", "record_and_report", "reload_code", "see_values"),
-            *("try_on_probation", "write_a_core"),
+            *(
+                "compare_in_shadow",
+                "install",
+                "log_lines",
+                "operate",
+                "record_and_report",
+                "reload_code",
+                "see_values",
+            ),
+            *("see_values", "try_on_probation", "write_a_core"),
         )
     ),
 )

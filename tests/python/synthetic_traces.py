@@ -1,11 +1,13 @@
 """Traces of components that never ran, as their reader gives them."""
 
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from mauve_rt.trace.bag.recorded import Split
 from mauve_rt.trace.format.kinds import kinds_told
@@ -21,6 +23,15 @@ TABLE = (ROOT / "mauve_msgs" / "msg" / "TraceRecord.msg").read_text(encoding="ut
 MS = 1_000_000
 EPOCH_NS = 20 * MS
 PERIOD_NS = 10 * MS
+
+
+def installed_messages(prefix: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let mauve_msgs and the messages of mauve_test_msgs be installed, and no others."""
+    shutil.copytree(ROOT / "mauve_msgs" / "msg", prefix / "share" / "mauve_msgs" / "msg")
+    folder = prefix / "share" / "mauve_test_msgs" / "msg"
+    folder.mkdir(parents=True)
+    (folder / "Text.msg").write_text("string data\n")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
 
 
 def trace_of(source: SyntheticSource, messages: tuple[Message, ...] = ()) -> Trace:

@@ -23,20 +23,24 @@ constexpr std::size_t kMostBytes = std::size_t{1} << 20U;  // of these lines
 constexpr std::size_t kLongest = std::size_t{64} * 1024;   // characters of one line
 
 struct ConsoleLine {
-  std::string function{};
-  std::string file{};
-  std::size_t number{0};
+  LinePlace place{};
   int severity{0};
   std::string name{};
   rcutils_time_point_value_t time_ns{0};
   std::string text{};
 
-  std::size_t bytes() const noexcept { return function.size() + file.size() + name.size() + text.size(); }
+  std::size_t bytes() const noexcept {
+    return place.function.size() + place.file.size() + name.size() + text.size();
+  }
 };
 
+rcutils_log_location_t location_of(const LinePlace& place) {
+  return {
+      .function_name = place.function.c_str(), .file_name = place.file.c_str(), .line_number = place.number};
+}
+
 void write_line(const ConsoleLine& line, const char* format, ...) {
-  const rcutils_log_location_t location{
-      .function_name = line.function.c_str(), .file_name = line.file.c_str(), .line_number = line.number};
+  const rcutils_log_location_t location = location_of(line.place);
   va_list arguments;
   va_start(arguments, format);
   rcutils_logging_console_output_handler(&location, line.severity, line.name.c_str(), line.time_ns, format,
@@ -135,16 +139,30 @@ void log_line(const rcutils_log_location_t* location, int severity, const char* 
   other_handlers(location, severity, name, time_ns, format, arguments);
   ConsoleLine line{.severity = severity, .name = name != nullptr ? name : "", .time_ns = time_ns};
   if (location != nullptr) {
-    line.function = location->function_name != nullptr ? location->function_name : "";
-    line.file = location->file_name != nullptr ? location->file_name : "";
-    line.number = location->line_number;
+    line.place = {.function = location->function_name != nullptr ? location->function_name : "",
+                  .file = location->file_name != nullptr ? location->file_name : "",
+                  .number = location->line_number};
   }
   line.text = formatted(format, &again);
   va_end(again);
   console_queue().add(std::move(line));
 }
 
+void write_through(const rcutils_log_location_t& location, int severity, const char* name,
+                   rcutils_time_point_value_t time_ns, const char* format, ...) {
+  va_list arguments;
+  va_start(arguments, format);
+  if (const auto handler = rcutils_logging_get_output_handler())
+    handler(&location, severity, name, time_ns, format, &arguments);
+  va_end(arguments);
+}
+
 }  // namespace
+
+void Console::write(int severity, const std::string& name, time_ns_t time_ns, const std::string& text,
+                    const LinePlace& place) {
+  write_through(location_of(place), severity, name.c_str(), time_ns, "%s", text.c_str());
+}
 
 void Console::start() {
   if (other_handlers != nullptr) return;

@@ -46,6 +46,12 @@ void add_entry(ChannelPart& part, std::uint64_t log_ns, std::uint64_t offset) {
 
 }  // namespace
 
+std::size_t MessageBatch::add_topic() {
+  counts.emplace_back();
+  sizes_.push_back(0);
+  return sizes_.size() - 1;
+}
+
 std::size_t MessageBatch::room_for(std::size_t message_bytes) noexcept { return kHead + message_bytes; }
 
 void MessageBatch::append(std::size_t topic, time_ns_t time_ns, std::span<const std::byte> message) {

@@ -39,6 +39,8 @@ class MessageBatch {
   /// Counts for so many topics.
   explicit MessageBatch(std::size_t topics) : counts(topics), sizes_(topics) {}
 
+  /// Counts for a further topic; returns its number. Messages may be in the batch.
+  std::size_t add_topic();
   /// What a message of so many bytes takes.
   static std::size_t room_for(std::size_t message_bytes) noexcept;
   void append(std::size_t topic, time_ns_t time_ns, std::span<const std::byte> message);

@@ -40,7 +40,7 @@ bool publish(rcl_publisher_t& publisher, std::vector<std::byte>& message) {
 
 Mirror::Mirror(rcl_node_t& node, const TopicSettings& topic, std::size_t number, TopicLog& log,
                const MirrorSettings& settings)
-    : BoundTopic(topic.resource, number, log),
+    : BoundTopic(topic, number, log),
       settings_(settings),
       publisher_(node, rcl_get_zero_initialized_publisher()) {
   open(*publisher_.get(), node, topic.type, topic.name, topic.qos, topic.resource);

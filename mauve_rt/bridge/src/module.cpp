@@ -26,8 +26,9 @@ using mauve::bindings::Typed;
 
 template <std::size_t (Bridge::*open)(const TopicSettings&)>
 std::size_t open_topic(Bridge& self, const std::string& resource, const std::string& topic,
-                       const std::string& type, const rmw_qos_profile_t& qos) {
-  return (self.*open)({.resource = resource, .name = topic, .type = type, .qos = qos});
+                       const std::string& type, const rmw_qos_profile_t& qos, bool is_static) {
+  return (self.*
+          open)({.resource = resource, .name = topic, .type = type, .qos = qos, .is_static = is_static});
 }
 
 /// From (name, type, "" | "fixed" | "sequence", size, fields).
@@ -133,6 +134,15 @@ PYBIND11_MODULE(_bridge, module) {
              R"(From here on a thread of its own writes the process's log lines to the console.
 
 Once, after rclpy.init(), which was told `--disable-stdout-logs`.)");
+  module.def(
+      "write_log_line",
+      [](int severity, const std::string& name, time_ns_t time_ns, const std::string& text,
+         const std::string& function, const std::string& file, std::size_t line) {
+        Console::write(severity, name, time_ns, text, {.function = function, .file = file, .number = line});
+      },
+      py::arg("severity"), py::arg("name"), py::arg("time_ns"), py::arg("text"), py::arg("function"),
+      py::arg("file"), py::arg("line"), Unlocked(),
+      "Write a line with a time of its own (CLOCK_REALTIME), to /rosout and the console.");
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked(),
              "Wait until all lines are written; False: the console is not read.");
   module.def("wait_by_the_monotonic_clock", &wait_by_the_monotonic_clock,
@@ -242,7 +252,7 @@ sequence numbers of a writer) and what found no room.)")
                   "Whether the middleware numbers the messages of each writer, so that gaps are known.")
       .def("subscribe", &TopicReceiver::subscribe, py::arg("topic"), py::arg("type"), py::arg("qos"),
            Unlocked(),
-           R"(Subscribe, before start(); returns the number of the topic, counted from 0.
+           R"(Subscribe, also after start(); returns the number of the topic, counted from 0.
 
 Raises:
     MauveError: the type is not installed, or the middleware refuses.)")
@@ -321,13 +331,16 @@ What is opened can be found on the network; it serves its resource from attach()
 
 Priority (SCHED_FIFO) and CPUs (none: any) are the sending thread's.)")
       .def("publish", &open_topic<&Bridge::publish>, py::arg("resource"), py::arg("topic"), py::arg("type"),
-           py::arg("qos"), Unlocked(),
+           py::arg("qos"), py::kw_only(), py::arg("is_static") = false, Unlocked(),
            R"(Open a topic for a resource; returns the number of what was opened, also in the log.
+
+`is_static`: for the static transforms of a transform_tree.
 
 Raises:
     MauveError: the type is not installed, or the middleware refuses; nothing is open then.)")
       .def("subscribe", &open_topic<&Bridge::subscribe>, py::arg("resource"), py::arg("topic"),
-           py::arg("type"), py::arg("qos"), Unlocked(), "As publish(), the other way.")
+           py::arg("type"), py::arg("qos"), py::kw_only(), py::arg("is_static") = false, Unlocked(),
+           "As publish(), the other way.")
       .def("mirror", &open_mirror, py::arg("resource"), py::arg("topic"), py::arg("type"), py::arg("qos"),
            py::kw_only(), py::arg("period_ns"), py::arg("numbers") = std::nullopt,
            py::arg("number") = std::nullopt, Unlocked(),

@@ -59,10 +59,8 @@ std::uint64_t SequenceGaps::follow(const rmw_gid_t& writer, std::uint64_t sequen
 
 std::size_t ReceivedQueue::add_topic() {
   const LockGuard lock(mutex_);
-  const std::size_t number = waiting_.counts.size();
-  MAUVE_EXPECTS(number < kMostTopics && waiting_.bytes() == 0);
-  waiting_ = MessageBatch(number + 1);
-  return number;
+  MAUVE_EXPECTS(waiting_.counts.size() < kMostTopics);
+  return waiting_.add_topic();
 }
 
 void ReceivedQueue::add(std::size_t topic, time_ns_t time_ns, std::span<const std::byte> message) {
@@ -168,18 +166,24 @@ bool TopicReceiver::numbered() {
 std::size_t TopicReceiver::subscribe(const std::string& name, const std::string& type,
                                      const rmw_qos_profile_t& qos) {
   const LockGuard lock(mutex_);
-  MAUVE_EXPECTS(receiver_ == nullptr);
-  topics_.push_back(std::make_unique<ReceivedTopic>(node_, name, type, qos, queue_));
+  auto topic = std::make_unique<ReceivedTopic>(node_, name, type, qos, queue_);
+  if (receiver_ != nullptr) receiver_->stop();  // its thread reads the topics
+  topics_.push_back(std::move(topic));
+  if (receiver_ != nullptr) receiver_->start(arrivals());
   return topics_.size() - 1;
 }
 
 void TopicReceiver::start() {
   const LockGuard lock(mutex_);
   receiver_ = std::make_unique<Receiver>(node_, "recorded_in", kPause);
-  std::vector<Arrival*> arrivals;
-  arrivals.reserve(topics_.size());
-  for (const auto& topic : topics_) arrivals.push_back(topic.get());
-  receiver_->start(std::move(arrivals));
+  receiver_->start(arrivals());
+}
+
+std::vector<Arrival*> TopicReceiver::arrivals() const {
+  std::vector<Arrival*> all;
+  all.reserve(topics_.size());
+  for (const auto& topic : topics_) all.push_back(topic.get());
+  return all;
 }
 
 void TopicReceiver::stop() {

@@ -118,7 +118,8 @@ class TopicReceiver {
   /// Whether the middleware numbers the messages of each writer, so that gaps are known. [non-rt]
   static bool numbered();
 
-  /// Before start(). Returns the number of the topic, counted from 0. Throws Error as ReceivedTopic. [non-rt]
+  /// Returns the number of the topic, counted from 0. After start() the receiving thread is started again: messages that
+  /// arrive during the restart wait in the middleware. Throws Error as ReceivedTopic. [non-rt]
   std::size_t subscribe(const std::string& name, const std::string& type, const rmw_qos_profile_t& qos);
   /// Throws Error when rcl refuses. [non-rt]
   void start();
@@ -136,6 +137,8 @@ class TopicReceiver {
   rcl_node_t& node_;
   ReceivedQueue queue_;
   Mutex mutex_;
+  std::vector<Arrival*> arrivals() const MAUVE_REQUIRES(mutex_);
+
   std::vector<std::unique_ptr<ReceivedTopic>> topics_ MAUVE_GUARDED_BY(mutex_);
   std::unique_ptr<Receiver> receiver_ MAUVE_GUARDED_BY(mutex_);
 };

@@ -36,6 +36,21 @@ std::vector<Arrival*> BoundTopic::arrivals(Lane lane) {
   return lane == Lane::events ? events().arrivals() : std::vector<Arrival*>{};
 }
 
+void BoundTopic::attach(std::shared_ptr<Resource> resource) {
+  if (is_static_) {
+    Resource* const side = resource->static_side();
+    if (side == nullptr) {
+      throw Error(ErrorCode::invalid_argument, "the resource has no static values",
+                  {.element = "resource " + resource_name(),
+                   .expected = "a transform_tree",
+                   .found = resource->kind(),
+                   .remedy = "bind it to one topic"});
+    }
+    resource = std::shared_ptr<Resource>(std::move(resource), side);
+  }
+  Binding::attach(std::move(resource));
+}
+
 void BoundTopic::report(BridgeReport& report) const {
   const LockGuard lock(refusal_mutex_);
   report.topics.push_back({.resource = resource_name(),
@@ -60,7 +75,7 @@ void BoundTopic::count(bool passed, time_ns_t time_ns, std::span<const std::byte
 
 OutgoingTopic::OutgoingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number,
                              TopicLog& log)
-    : BoundTopic(settings.resource, number, log), publisher_(node, rcl_get_zero_initialized_publisher()) {
+    : BoundTopic(settings, number, log), publisher_(node, rcl_get_zero_initialized_publisher()) {
   rcl_publisher_options_t options = rcl_publisher_get_default_options();
   options.qos = settings.qos;
   check(rcl_publisher_init(publisher_.get(), &node, &message_type_support(settings.type),
@@ -159,7 +174,7 @@ void ArrivalTwin::take() {
 
 IncomingTopic::IncomingTopic(rcl_node_t& node, const TopicSettings& settings, std::size_t number,
                              TopicLog& log)
-    : BoundTopic(settings.resource, number, log),
+    : BoundTopic(settings, number, log),
       node_(node),
       settings_(settings),
       subscription_(node, rcl_get_zero_initialized_subscription()) {

@@ -25,14 +25,16 @@ struct TopicSettings {
   std::string name;  // as given; rcl expands and remaps it
   std::string type;  // package/msg/Type
   rmw_qos_profile_t qos;
+  bool is_static{false};  // of the resource's static side
 };
 
 /// What both directions have in common.
 class BoundTopic : public Binding {
  public:
   /// `number`: in the log.
-  BoundTopic(const std::string& resource_name, std::size_t number, TopicLog& log)
-      : Binding(resource_name), log_(log), number_(number) {}
+  BoundTopic(const TopicSettings& settings, std::size_t number, TopicLog& log)
+      : Binding(settings.resource), log_(log), number_(number), is_static_(settings.is_static) {}
+  void attach(std::shared_ptr<Resource> resource) override;
   std::vector<Arrival*> arrivals(Lane lane) override;
   void report(BridgeReport& report) const override;
 
@@ -49,6 +51,7 @@ class BoundTopic : public Binding {
  private:
   TopicLog& log_;
   std::size_t number_;
+  bool is_static_;
   TrafficCounter counter_;
   time_ns_t explained_ns_{0};  // of the thread that counts
   mutable Mutex refusal_mutex_;

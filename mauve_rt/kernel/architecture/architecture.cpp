@@ -530,6 +530,20 @@ std::shared_ptr<Resource> Architecture::find_resource(const std::string& name) c
   return find_in(lists_.resources, name);
 }
 
+void Architecture::set_log_level(const std::string& name, LogLevel level) {
+  const auto component = find_component(name);
+  const auto resource = find_resource(name);
+  if (component == nullptr && resource == nullptr) throw_no_component(name, components());
+  if (component != nullptr) component->task().log_source().set_level(level);
+  if (resource != nullptr) resource->log_source().set_level(level);
+}
+
+LogLevel Architecture::log_level(const std::string& name) const {
+  const auto resource = find_resource(name);
+  if (resource != nullptr && find_component(name) == nullptr) return resource->log_source().level();
+  return hold_component(name)->task().log_source().level();
+}
+
 Component& Architecture::component(const std::string& name) const { return *hold_component(name); }
 Resource& Architecture::resource(const std::string& name) const { return *hold_resource(name); }
 

@@ -32,6 +32,7 @@ std::shared_ptr<Component> Architecture::make_unlisted(const std::string& name) 
     made = {member, &member->component};
     numbered_[made->task().number()] = made;
   }
+  made->task().set_log_queue(log_queue_);
   const LockGuard lock(trace_mutex_);
   Task& task = made->task();
   if (task.number() < finals_.size()) task.set_first_record(finals_[task.number()].written);

@@ -429,7 +429,7 @@ void PluginRegistry::throw_not_of_type(const ResourceKind& kind, const std::stri
   }
   if (!kind.messages.empty()) {
     throw Error(
-        ErrorCode::invalid_argument, "an " + kind.name + " cannot be said by that message",
+        ErrorCode::invalid_argument, "a resource of kind " + kind.name + " cannot be said by that message",
         {.element = "type", .expected = join(kind.messages) + ", or none, which is the last", .found = type});
   }
   throw Error(

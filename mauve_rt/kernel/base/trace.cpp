@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/base/trace.hpp"
 
-#include <bit>
 #include <map>
 
-#include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 
 namespace mauve {
@@ -46,19 +44,6 @@ std::vector<std::string> TraceNames::all() {
   NameTable& table = name_table();
   const LockGuard lock(table.mutex);
   return table.words;
-}
-
-TraceRing::TraceRing(std::uint16_t component, std::size_t capacity)
-    : places_(std::make_unique<TraceRecord[]>(std::bit_ceil(capacity))),
-      mask_(std::bit_ceil(capacity) - 1),
-      component_(component) {}
-
-void TraceRing::drain(std::vector<TraceRecord>& into) {
-  const std::uint64_t head = head_.load(std::memory_order_acquire);
-  std::uint64_t tail = tail_.load(std::memory_order_relaxed);  // relaxed: only the consumer writes it
-  MAUVE_EXPECTS(head - tail <= mask_ + 1);
-  for (; tail != head; ++tail) into.push_back(places_[tail & mask_]);
-  tail_.store(tail, std::memory_order_release);
 }
 
 }  // namespace mauve

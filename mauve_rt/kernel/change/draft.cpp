@@ -195,6 +195,7 @@ void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> reso
   check_name("resource", name);
   if (find_resource(name) != nullptr) throw_taken("resource", name);
   resource->set_name(name);
+  resource->set_log_queue(architecture_.log_queue());
   if (longest_hold_ns != 0) resource->set_longest_hold_ns(longest_hold_ns);
   architecture_.prepare_outward(*resource, topic);
   resources_.push_back({.resource = std::move(resource), .added_step = step_});

@@ -13,15 +13,17 @@ namespace mauve {
 
 namespace {
 
-/// The calling thread is the task's own for as long: marks and service records go to its ring.
+/// The calling thread is the task's own for as long: marks, service records and log lines go to its rings.
 class TaskOfThread {
  public:
   explicit TaskOfThread(Task& task) noexcept {
     TraceRing::set_for_this_thread(task.ring());
+    LogRing::set_for_this_thread(task.log_ring());
     Task::set_simulated_here(&task);
   }
   ~TaskOfThread() {
     TraceRing::set_for_this_thread(nullptr);
+    LogRing::set_for_this_thread(nullptr);
     Task::set_simulated_here(nullptr);
   }
   TaskOfThread(const TaskOfThread&) = delete;
@@ -165,6 +167,7 @@ void SimulatedHost::join() {
   }
   architecture().set_host(*this);
   processor_.clock.advance_to(simulation_.now_ns_);
+  architecture().log_queue()->set_clock(&processor_.clock);
   simulation_.processors_.push_back(&processor_);
 }
 
@@ -198,6 +201,7 @@ void SimulatedHost::shutdown() noexcept {
     component->settle_shadow();  // no thread of its own retires it
     component->task().end_simulation();
   }
+  architecture().log_queue()->set_clock(nullptr);
   architecture().release_host(*this);
 }
 

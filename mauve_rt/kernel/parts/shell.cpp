@@ -25,6 +25,7 @@ PropertyBase* Shell::find_property(std::string_view name) const noexcept {
 }
 
 void Shell::set_context(const Context* context) noexcept {
+  context_ = context;
   for (const auto& port : ports_) port->set_context(context);
 }
 

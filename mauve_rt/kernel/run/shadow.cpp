@@ -74,6 +74,9 @@ Shadow::Shadow(Component& component, ShadowParts parts, ShadowOptions options)
                  .found = std::to_string(options_.budget_ns)});
   }
   require_same_class(component, *parts_.shell);
+  const LogSource& live = component.task().log_source();
+  machine_.context().log.set_up(live.queue(), live.component(), TraceNames::intern("shadow"));
+  machine_.context().log.set_level(live.level());
   for (const ShownProperty& shown : component.shown().properties) {
     PropertyBase* own = parts_.shell->find_property(shown.name);
     PropertyValue value = own->checked(shown.value);

@@ -9,16 +9,24 @@ namespace mauve {
 
 namespace {
 
-/// What the candidate marks in the trace goes nowhere: in a simulation the ring at hand is the component's.
+/// What the candidate marks in the trace goes nowhere, and its log lines go to the queue: in a simulation the rings at hand are
+/// the component's.
 class WithoutRing {
  public:
-  WithoutRing() noexcept { TraceRing::set_for_this_thread(nullptr); }
-  ~WithoutRing() { TraceRing::set_for_this_thread(before_); }
+  WithoutRing() noexcept {
+    TraceRing::set_for_this_thread(nullptr);
+    LogRing::set_for_this_thread(nullptr);
+  }
+  ~WithoutRing() {
+    TraceRing::set_for_this_thread(before_);
+    LogRing::set_for_this_thread(log_before_);
+  }
   WithoutRing(const WithoutRing&) = delete;
   WithoutRing& operator=(const WithoutRing&) = delete;
 
  private:
   TraceRing* before_{detail::this_threads_ring};
+  LogRing* log_before_{detail::this_threads_log_ring};
 };
 
 }  // namespace

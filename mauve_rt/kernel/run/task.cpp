@@ -181,10 +181,18 @@ void Task::begin_trace(bool trace) {
   machine_.set_ring(ring_.get());
 }
 
+void Task::begin_log() {
+  const std::shared_ptr<LogQueue>& queue = log_source().queue();
+  if (queue == nullptr) return;
+  if (log_ring_ == nullptr) log_ring_ = queue->make_ring(number_);
+  log_ring_->set_up(simulated_ ? &clock() : nullptr, &machine_.present());
+}
+
 void Task::simulate(const Clock& clock, bool trace) {
   simulated_ = true;
   machine_.set_clock(clock);
   begin_trace(trace);
+  begin_log();
 }
 
 void Task::end_simulation() noexcept {
@@ -195,6 +203,7 @@ void Task::end_simulation() noexcept {
   simulated_ = false;
   machine_.set_clock(MonotonicClock::instance());
   if (ring_ != nullptr) ring_->set_clock(nullptr);
+  if (log_ring_ != nullptr) log_ring_->set_up(nullptr, &machine_.present());
 }
 
 bool Task::end_thread(time_ns_t until_ns) noexcept {

@@ -33,6 +33,7 @@ void Task::create_thread(Barrier* barrier, bool require_realtime, bool trace,
   demoted_ = false;
   barrier_ = barrier;
   begin_trace(trace);
+  begin_log();
   parked_.store(1, std::memory_order_relaxed);  // relaxed: the thread does not exist yet
   ended_.store(0, std::memory_order_relaxed);
   ready_.store(0, std::memory_order_relaxed);
@@ -85,6 +86,7 @@ void Task::thread_main() noexcept {
   task_of_this_thread = this;
   locks_held_ = &PiMutex::count_of_this_thread();
   TraceRing::set_for_this_thread(ring_.get());
+  LogRing::set_for_this_thread(log_ring_.get());
   prctl(PR_SET_TIMERSLACK, 1UL);  // of use where SCHED_FIFO was refused
   counters_.attach();
   ready_.store(1, std::memory_order_release);

@@ -5,7 +5,7 @@ before, where everything can still be refused, attach() after.
 """
 
 import threading
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -18,11 +18,12 @@ from mauve_rt.errors import MauveError, TopicError
 from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
-from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
+from mauve_rt.model.schema import QosModel, ResourceModel, ServiceModel, TopicModel
 from mauve_rt.trace.bag.recorded import SentMessage
 
 MAX_MIRRORS = 64
 _MIRROR_DEPTH = 10
+_STATIC_DEPTH = 100  # as of tf2's listeners: each publisher's last message waits for who comes later
 _SIDES = {"publish": "publishes", "subscribe": "subscribes"}  # fields of ResourceInfo
 
 
@@ -112,8 +113,8 @@ class BoundResources:
             try:
                 for name, resource in resources.items():
                     numbers = opened.setdefault(name, [])
-                    if resource.topic is not None:
-                        numbers.append(self._open_topic(bridge, name, resource, resource.topic))
+                    for topic, is_static in _topics(resource):
+                        numbers.append(self._open_topic(bridge, name, resource, topic, is_static=is_static))
                     if resource.service is not None:
                         numbers.append(_open_service(bridge, name, described[name], resource.service))
             except MauveError:
@@ -121,16 +122,18 @@ class BoundResources:
                 raise
         return {name: numbers for name, numbers in opened.items() if numbers}
 
-    def _open_topic(self, bridge: Bridge, name: str, resource: ResourceModel, topic: TopicModel) -> int:
+    def _open_topic(
+        self, bridge: Bridge, name: str, resource: ResourceModel, topic: TopicModel, *, is_static: bool
+    ) -> int:
         full_name = self._node.resolve_topic_name(topic.name)
         known = dict(self._node.get_topic_names_and_types()).get(full_name, ())
         if others := _others(known, resource.topic_type):
             raise TopicError(full_name, name, expected=resource.topic_type, found=" and ".join(others))
-        for remark in qos_remarks(topic):
+        for remark in qos_remarks(topic) if not is_static else ():
             self._node.get_logger().warning(remark_text(name, topic, remark))
         qos = qos_profile(topic.offered_qos, capacity=resource.parameters.get("capacity", 0))
         bind = bridge.publish if topic.direction == "publish" else bridge.subscribe
-        number = bind(name, topic.name, resource.topic_type, native_qos(qos))
+        number = bind(name, topic.name, resource.topic_type, native_qos(qos), is_static=is_static)
         self._topics[number] = BoundTopic(name, topic.direction, full_name, resource.topic_type, qos)
         return number
 
@@ -316,6 +319,16 @@ class BoundResources:
     def dropped_messages(self) -> int:
         """Messages that found no room to wait."""
         return self._bridge.log_dropped if self._bridge is not None else 0
+
+
+def _topics(resource: ResourceModel) -> Iterator[tuple[TopicModel, bool]]:
+    """The topics that a resource is bound to, and whether one is that of its static transforms."""
+    if resource.topic is None:
+        return
+    if static_topic := resource.parameter("static_topic"):
+        qos = QosModel(profile="transient_local", depth=_STATIC_DEPTH)
+        yield TopicModel(name=static_topic, direction=resource.topic.direction, qos=qos), True
+    yield resource.topic, False
 
 
 def _open_service(bridge: Bridge, name: str, resource: ResourceDescription, service: ServiceModel) -> int:

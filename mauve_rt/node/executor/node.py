@@ -20,7 +20,7 @@ from mauve_rt.control.requests import Code
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.values import Values
 from mauve_rt.counts import counted
-from mauve_rt.errors import MauveError, exception_text, one_line
+from mauve_rt.errors import MauveError, ParameterError, exception_text, one_line
 from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.bounds import WatchedBounds
@@ -28,6 +28,7 @@ from mauve_rt.node.executor.console import Console, NameWatch, TopicWatch
 from mauve_rt.node.executor.lost_supervisors import LostSupervisors
 from mauve_rt.node.executor.mirrors import Mirrors
 from mauve_rt.node.executor.parameters import Parameters
+from mauve_rt.node.executor.part_log import PartLog
 from mauve_rt.node.executor.recording import Recording, RecordingOrders
 from mauve_rt.node.executor.rules import OwnRules, load_reply
 from mauve_rt.node.executor.sentinel import Sentinel
@@ -39,7 +40,7 @@ from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_s
 from mauve_rt.node.shared.settings import OF_RCLPY, refusal
 from mauve_rt.node.shared.wall_clock import WallClock
 from mauve_rt.node.shared.watch import Watch
-from mauve_rt.trace.bag.recorded import Split
+from mauve_rt.trace.bag.recorded import COMPRESSIONS, Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
@@ -99,6 +100,7 @@ class ExecutorNode(LifecycleNode):
             queue_bytes=settings["record_queue_bytes"],
             waits_for_room=settings["bag_waits_for_room"],
         )
+        self._part_log = PartLog(self, runtime, self._recording, self.watch)
         self._state = StatePublisher(self, runtime, self._recording, self.watch)
         self._properties = Parameters(self, runtime)
         self._judge = Judge(runtime, uses=self._bound.bindings, others=real_time_threads)
@@ -197,6 +199,7 @@ class ExecutorNode(LifecycleNode):
         )
         self._lost_supervisors = LostSupervisors(self, self._runtime, services.handle, self.watch)
         silent_after_ns = round(self._settings["node_silent_after_s"] * 1e9)
+        self._part_log.open_services(query_group)
         self._node_watch = NodeWatch(super().get_logger().name, silent_after_ns=silent_after_ns)
         self.create_timer(_HEALTH_S, self._tell_health, callback_group=query_group)
         if self._runtime.active:
@@ -269,17 +272,36 @@ class ExecutorNode(LifecycleNode):
         self._sentinel.configure()
         self._mirrors.configure(self._runtime.model.mirrors)
         with self._properties.lock:
-            names = ("rules", "bag", "record_topics", "bag_split_s", "bag_split_bytes")
-            rules, bag, topics, after_s, after_bytes = (self.get_parameter(name).value for name in names)
+            names = ("rules", "bag", "record_topics", "record_topic_regexes")
+            rules, bag, topics, expressions = (self.get_parameter(name).value for name in names)
+            split, compression = self._split(), self._compression()
         self._rules.configure(rules)
         self._folder.configure(self._runtime)
         if bag:
-            self._recording.start(Path(bag), topics, split=Split(after_s=after_s, after_bytes=after_bytes))
+            self._recording.start(
+                Path(bag), topics, split=split, expressions=expressions, compression=compression
+            )
         self._log_realtime()
         parts = counted(len(self._runtime.components()), "component")
         resources = counted(len(self._runtime.described_resources()), "resource")
         recorded = f", recording to {bag}" if bag else ""
         self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
+
+    def _compression(self) -> str:
+        name = str(self.get_parameter("bag_compression").value)
+        if name not in COMPRESSIONS:
+            raise ParameterError(
+                f"parameter bag_compression: expected {' or '.join(COMPRESSIONS)}, found '{name}'"
+            )
+        return name
+
+    def _split(self) -> Split:
+        names = ("bag_split_s", "bag_split_bytes", "bag_max_size_bytes")
+        after_s, after_bytes, max_bytes = (self.get_parameter(name).value for name in names)
+        split = Split(after_s=after_s, after_bytes=after_bytes, max_bytes=max_bytes)
+        if misfit := split.misfit():
+            raise ParameterError(f"parameter bag_max_size_bytes: {misfit}")
+        return split
 
     def _activate(self) -> None:
         self._sentinel.arm()  # before a component writes
@@ -382,6 +404,7 @@ class ExecutorNode(LifecycleNode):
             if self._node_watch is not None:
                 self._node_watch.stop()
             self._state.close()
+            self._part_log.close()
             self.destroy_node()
 
     def destroy_node(self) -> None:
@@ -396,6 +419,7 @@ class ExecutorNode(LifecycleNode):
     def _release(self) -> None:
         self._runtime.require_parked()
         self._state.flush()
+        self._part_log.write_last()
         self._recording.stop()
         self._rules.close()
         self._folder.close()

@@ -1,7 +1,7 @@
 """The bags of an executor: its trace, messages it sends and receives, topics it is asked to record."""
 
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
@@ -15,35 +15,20 @@ from mauve_rt._kernel import monotonic_ns
 from mauve_rt.control.recorded_values import RecordedValues, choose
 from mauve_rt.control.requests import Code, Outcome, RecordingOrder, RefusalError
 from mauve_rt.control.runtime import Observed, Runtime
-from mauve_rt.errors import MauveError, ParameterError, one_line
+from mauve_rt.errors import MauveError, ParameterError
 from mauve_rt.interfaces.descriptions import trace_architecture
 from mauve_rt.interfaces.qos import recorded_qos
 from mauve_rt.interfaces.recorded_shadows import RecordedShadows
-from mauve_rt.model import message_class
-from mauve_rt.model.schema import QOS_NAMES
 from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
-from mauve_rt.node.executor.received_topics import ChosenTopic, ReceivedTopics
+from mauve_rt.node.executor.received_topics import ReceivedTopics
+from mauve_rt.node.executor.topic_choice import Choice, TopicChoice
 from mauve_rt.trace.bag.recorded import SentMessage, Split
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
+    from mauve_rt.trace.recording.ledger import Entry
     from mauve_rt.trace.recording.recorder import MessageSource, Recorder
-    from mauve_rt.trace.recording.trace_bag import Entry
-
-_BEST_EFFORT = "best_effort"
-
-
-_OWN = {  # recorded in any case
-    "~/state": "mauve_msgs/msg/ArchitectureState",
-    "~/events": "mauve_msgs/msg/ReconfigurationEvent",
-    "~/decisions": "mauve_msgs/msg/SupervisorDecision",
-    "~/shadow": "mauve_msgs/msg/Shadow",
-    "~/violations": "mauve_msgs/msg/BoundViolation",
-    "~/trace/batches": "mauve_msgs/msg/TraceBatch",
-    "~/trace/names": "mauve_msgs/msg/TraceNames",
-    "~/trace/architecture": "mauve_msgs/msg/TraceArchitecture",
-}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,8 +69,6 @@ class Recording:
     | `_is_starting`, `_is_called_off` | start(), stop() | `_lock` |
     | `_shadows`       | start()          | `_lock`         |
     | `_received`      | start(), stop()  | exchanged whole |
-    | `_chosen`        | start(), stop()  | exchanged whole |
-    | `_told`          | look()           |                 |
     | `_last`          | stop()           | exchanged whole |
     """
 
@@ -114,10 +97,18 @@ class Recording:
         self._last: Recorder | None = None  # its disk may still write
         self._is_starting = self._is_called_off = False
         self._received: ReceivedTopics | None = None
-        self._chosen: tuple[ChosenTopic, ...] = ()
-        self._told: set[tuple[str, str]] = set()  # topics, and types of others on them
+        self._choice = TopicChoice(node, bound.types)
 
-    def start(self, bag: Path, topics: Sequence[str], *, split: Split, values: Sequence[str] = ()) -> Path:
+    def start(
+        self,
+        bag: Path,
+        topics: Sequence[str],
+        *,
+        split: Split,
+        values: Sequence[str] = (),
+        expressions: Sequence[str] = (),
+        compression: str = "none",
+    ) -> Path:
         """Create the bag and record from now on; returns its folder, absolute.
 
         Args:
@@ -125,7 +116,10 @@ class Recording:
             topics: further ones, each as `name`, `name:package/msg/Type` or `name:package/msg/Type:qos`. Best
                 effort, the default, hears every publisher; transient_local also hears what was said before.
                 What the executor sends, and what its resources are bound to, is recorded anyhow, and once.
+                A name may be a pattern, `/camera/*`, which takes topics that appear later, too.
             split: when to go on in a new file.
+            expressions: regular expressions; each topic whose name contains a match, as by a pattern.
+            compression: of the chunks of the files, one of COMPRESSIONS.
             values: resources, or COMPONENT.PORT, whose every write is recorded, besides those of the file.
 
         Raises:
@@ -138,13 +132,13 @@ class Recording:
         from mauve_rt.native_program import native_program  # noqa: PLC0415 - a start without a bag needs none
         from mauve_rt.trace.recording.recorder import Recorder  # noqa: PLC0415
 
-        chosen = tuple(self._choose(topics))
+        choice = self._choice.choose(topics, expressions)
         name = self._node.get_fully_qualified_name()
         try:
             recorded = choose(self._runtime, [*self._runtime.model.recorded, *values], name)
         except MauveError as error:
             raise ParameterError(str(error)) from error
-        self._begin(chosen)  # first: what is refused here leaves no folder behind
+        self._begin(choice)  # first: what is refused here leaves no folder behind
         try:
             shadows = RecordedShadows(self._runtime, name, _serialized)
             recorder = Recorder(
@@ -157,9 +151,10 @@ class Recording:
                 topics=self._received,
                 keeper=native_program("bag_keeper"),
                 waits_for_room=self._waits_for_room,
+                compression=compression,
             )
             try:
-                self._record_into(recorder, shadows, chosen)
+                self._record_into(recorder, shadows)
             except BaseException:
                 recorder.stop()
                 raise
@@ -172,7 +167,7 @@ class Recording:
                 self._is_starting = False
         return recorder.directory
 
-    def _begin(self, chosen: tuple[ChosenTopic, ...]) -> None:
+    def _begin(self, choice: Choice) -> None:
         with self._lock:
             if self._is_starting:
                 text = (
@@ -182,15 +177,13 @@ class Recording:
             if self.recording:
                 raise RecordingBusyError("it records already; stop that first")
             self.stop()
-            if chosen:
+            if choice.topics or choice.patterns:
                 self._received = ReceivedTopics(
-                    self._node, chosen, bound=self._bound.types, queue_bytes=self._queue_bytes
+                    self._node, choice, bound=self._bound.types, queue_bytes=self._queue_bytes
                 )
             self._is_starting, self._is_called_off = True, False
 
-    def _record_into(
-        self, recorder: "Recorder", shadows: RecordedShadows, chosen: tuple[ChosenTopic, ...]
-    ) -> None:
+    def _record_into(self, recorder: "Recorder", shadows: RecordedShadows) -> None:
         architecture = self._architecture(self._runtime.observe())
         with self._lock:
             if self._is_called_off:
@@ -199,7 +192,7 @@ class Recording:
                 )
             recorder.tell_architecture(architecture)
             recorder.start(discard=self._runtime.active)
-            self._recorder, self._shadows, self._chosen = recorder, shadows, chosen
+            self._recorder, self._shadows = recorder, shadows
 
     def stop(self) -> RecordingStatus | None:
         """Seal the bag; returns how it went, None when nothing was recorded. May be called again.
@@ -233,28 +226,47 @@ class Recording:
         recorder = self._recorder or self._last
         return None if recorder is None else _status(recorder)
 
-    def record(self, topic: str, type_name: str, data: bytes, *, qos: QoSProfile | None = None) -> None:
-        """Record a serialized message that was sent or received now."""
+    def record(
+        self,
+        topic: str,
+        type_name: str,
+        data: bytes,
+        *,
+        qos: QoSProfile | None = None,
+        instant_ns: int | None = None,
+    ) -> None:
+        """Record a serialized message that was sent or received now, or at that instant."""
         recorder = self._recorder
         if recorder is not None:
             offered = None if qos is None else recorded_qos(qos)
-            recorder.record(topic, type_name, data, monotonic_ns=monotonic_ns(), qos=offered)
+            when_ns = monotonic_ns() if instant_ns is None else instant_ns
+            recorder.record(topic, type_name, data, monotonic_ns=when_ns, qos=offered)
+
+    def takes(self, topic: str) -> bool:
+        """Whether the topic is recorded as one of other nodes, as it was asked for."""
+        received = self._received
+        return received is not None and any(each.full_name == topic for each in received.chosen)
 
     def look(self) -> None:
-        """Warn of nodes that use another type or quality of service on a topic. One thread at a time."""
-        if not (chosen := self._chosen):
+        """Take topics that patterns take now, and warn of those that do not fit. One thread at a time."""
+        if (received := self._received) is None:
             return
-        received = self._received
-        for topic, policy in received.misfits() if received is not None else ():
-            self._warn(
-                topic, f"a publisher's quality of service does not fit, in {policy}: it is not recorded"
+        warn = self._choice.warn_once
+        for topic, policy in received.misfits():
+            warn(
+                topic.full_name,
+                f"a publisher's quality of service does not fit, in {policy}: it is not recorded",
             )
         known = dict(self._node.get_topic_names_and_types())
-        for topic in chosen:
+        for topic in received.chosen:
             for other in set(known.get(topic.full_name, ())) - {topic.type_name}:
-                if (topic.full_name, other) not in self._told:
-                    self._told.add((topic.full_name, other))
-                    self._warn(topic, f"other nodes use {other} on it, and none of that is recorded")
+                warn(topic.full_name, f"other nodes use {other} on it, and none of that is recorded")
+        taken = [topic.full_name for topic in received.chosen]
+        for topic in self._choice.found(received.patterns, taken):
+            try:
+                received.add(topic)
+            except ParameterError as error:
+                warn(topic.full_name, str(error))
 
     def tell_architecture(self, observed: Observed) -> None:
         """Record what runs now."""
@@ -267,55 +279,10 @@ class Recording:
             trace_architecture(self._runtime, observed, self._bound.bindings(), others=real_time_threads())
         )
 
-    def _choose(self, topics: Sequence[str]) -> Iterator[ChosenTopic]:
-        """Each topic once; those that are recorded in any case are left out."""
-        anyhow = {self._node.resolve_topic_name(name): type_name for name, type_name in _OWN.items()}
-        anyhow |= self._bound.types()
-        found: dict[str, ChosenTopic] = {}
-        for text in topics:
-            topic = self._parse(text, anyhow)
-            before = found.setdefault(topic.full_name, topic)
-            if before[1:] != topic[1:]:
-                what = f"{before.type_name}:{before.qos} and {topic.type_name}:{topic.qos}"
-                raise ParameterError(
-                    f"topic {topic.full_name} to record: named twice, as {what}; name it once"
-                )
-        return (topic for name, topic in found.items() if name not in anyhow)
-
-    def _parse(self, topic: str, anyhow: Mapping[str, str]) -> ChosenTopic:
-        name, type_name, qos, *more = [*topic.split(":"), *([""] * (2 - topic.count(":")))]
-        try:
-            full_name = self._node.resolve_topic_name(name)
-        except Exception as error:  # rclpy has an exception class of its own for each mistake
-            expected = f"expected a name, found '{name}': {one_line(str(error))}"
-            raise ParameterError(f"topic to record: {expected}") from error
-        known = dict(self._node.get_topic_names_and_types()).get(full_name, [])
-        known = [anyhow[full_name]] if full_name in anyhow else known
-        if not type_name:
-            if len(known) != 1:
-                found = f"used with the types {' and '.join(known)}" if known else "used by nobody now"
-                raise ParameterError(
-                    f"topic {full_name} to record: {found}; give its type, {name}:package/msg/Type"
-                )
-            type_name = known[0]
-        elif known and type_name not in known:
-            raise ParameterError(
-                f"topic {full_name} to record: used as {' and '.join(known)}, found {type_name}"
-            )
-        if message_class(type_name) is None or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
-            expected = "name, name:package/msg/Type of an installed message, and perhaps one of"
-            expected = f"{expected} {', '.join(f':{word}' for word in QOS_NAMES)}"
-            raise ParameterError(f"topic to record: expected {expected}; found '{topic}'")
-        return ChosenTopic(name, full_name, type_name, qos or _BEST_EFFORT)
-
     def _unsubscribe(self) -> None:
-        self._chosen = ()
         received, self._received = self._received, None
         if received is not None:
             received.close()
-
-    def _warn(self, topic: ChosenTopic, what: str) -> None:
-        self._node.get_logger().warning(f"topic {topic.full_name} to record: {what}")
 
 
 def not_complete(status: RecordingStatus) -> str:
@@ -390,8 +357,19 @@ class RecordingOrders:
             )
             raise RefusalError(Code.INVALID, text)
         try:
-            split = Split(after_s=order.split_s or Split().after_s, after_bytes=order.split_bytes)
-            directory = self._recording.start(bag, order.topics, split=split, values=order.values)
+            split = Split(
+                after_s=order.split_s or Split().after_s,
+                after_bytes=order.split_bytes,
+                max_bytes=order.max_size_bytes,
+            )
+            directory = self._recording.start(
+                bag,
+                order.topics,
+                split=split,
+                values=order.values,
+                expressions=order.topic_regexes,
+                compression=order.compression or "none",
+            )
         except ParameterError as error:
             raise RefusalError(Code.INVALID, str(error)) from error
         except RecordingBusyError as error:

@@ -407,9 +407,12 @@ def _start_recording(ros: Any) -> Request:
         start=True,
         bag=ros.bag,
         topics=tuple(ros.topics),
+        topic_regexes=tuple(ros.topic_regexes),
         values=tuple(ros.values),
         split_s=ros.split_s,
         split_bytes=ros.split_bytes,
+        max_size_bytes=ros.max_size_bytes,
+        compression=ros.compression,
     )
     return Request(recording=order, **_common(ros))
 

@@ -26,7 +26,15 @@ PARAMETERS: dict[str, Setting] = {
     ),
     "bags": Setting("", "folder in which ~/start_recording creates bags; empty: the working directory"),
     "record_topics": Setting(
-        [], "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos", _CONFIGURED
+        [],
+        "further topics to record: name, name:package/msg/Type or name:package/msg/Type:qos; "
+        "/camera/* takes topics by a pattern, also those that appear later",
+        _CONFIGURED,
+    ),
+    "record_topic_regexes": Setting(
+        [],
+        "regular expressions: topics whose names contain a match are recorded, also later ones",
+        _CONFIGURED,
     ),
     "record_queue_bytes": Setting(
         67_108_864,  # 64 MiB
@@ -39,6 +47,13 @@ PARAMETERS: dict[str, Setting] = {
     "bag_split_bytes": Setting(
         0, "size at which a recording goes on in a new file, in bytes; 0: never", _CONFIGURED, minimum=0
     ),
+    "bag_max_size_bytes": Setting(
+        0,
+        "size of all files of a recording beyond which it deletes its oldest file, in bytes; 0: never",
+        _CONFIGURED,
+        minimum=0,
+    ),
+    "bag_compression": Setting("none", "compression of the chunks of a recording: none or zstd", _CONFIGURED),
     "bag_waits_for_room": Setting(
         default=False,
         description="a disk that is full or fails pauses a recording until it writes again; else it ends it",

@@ -60,9 +60,9 @@ class Watch:
         """
 
         @functools.wraps(callback)
-        def guard(*arguments: Any) -> Any:
+        def guard(*arguments: Any, **options: Any) -> Any:
             try:
-                return callback(*arguments)
+                return callback(*arguments, **options)
             except BaseException as error:  # noqa: BLE001 - rclpy would leave its group of callbacks blocked
                 self.tell(where, error)
                 return otherwise(*arguments, error) if otherwise is not None else None

@@ -30,6 +30,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from mauve_rt.counts import counted
+from mauve_rt.trace.bag.compression import Compress, compressed
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, MetadataError
 from mauve_rt.trace.bag.recorded import ReceivedBatch
 from mauve_rt.trace.errors import DiskError, TraceError
@@ -43,11 +44,18 @@ class McapFile:
     """Writes one MCAP file. For one thread at a time."""
 
     def __init__(
-        self, path: Path, *, profile: str, library: str, disk: Disk | None = None, room_bytes: int = 0
+        self,
+        path: Path,
+        *,
+        profile: str,
+        library: str,
+        disk: Disk | None = None,
+        room_bytes: int = 0,
+        compress: Compress | None = None,
     ) -> None:
         """Create the file, which is a complete empty one as soon as there is one of that name.
 
-        `room_bytes`: kept in it for last words, until finish().
+        `room_bytes`: kept in it for last words, until finish(); `compress`: each chunk, at its flush.
 
         Raises:
             DiskError: it exists already or cannot be written.
@@ -61,6 +69,7 @@ class McapFile:
         self._chunk_indexes = bytearray()
         start = MAGIC + record(Opcode.HEADER, profile=profile, library=library)
         self._room_bytes = room_bytes
+        self._compress = compress
         self._now = self._finished(Counts(), 0, len(start), zlib.crc32(start), room_bytes)
         self._before = self._now
         self._descriptor = -1
@@ -209,7 +218,8 @@ class McapFile:
 
     def _build(self, chunk: PendingChunk, before: "_Finished") -> Sequence[bytes | bytearray]:
         """Let `_now` be the file with that chunk; returns what is to be written behind its data."""
-        parts, index = chunk.build(before.data_end)
+        compression, data = compressed(chunk.records, self._compress)
+        parts, index = chunk.build(before.data_end, data, compression)
         self._chunk_indexes += index
         self._now = self._finished(
             before.counts.plus(chunk.counts),

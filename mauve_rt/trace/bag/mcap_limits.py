@@ -7,13 +7,12 @@ refused, not damaged: a repair would cut it off there.
 
 from typing import NoReturn
 
+from mauve_rt.trace.bag.compression import BYTES_PER_BYTE, MAX_CHUNK_BYTES
 from mauve_rt.trace.bag.mcap_library import Chunk, LZ4FrameDecompressor, McapError, ZstdDecompressor
 from mauve_rt.trace.errors import TraceError
 
-MAX_CHUNK_BYTES = 256 << 20
-"""Of a compressed chunk, unpacked."""
-FREE_BYTES, BYTES_PER_BYTE = 256 << 20, 200
-"""All compressed chunks may hold so much, and so much more for each byte of the file."""
+FREE_BYTES = 256 << 20
+"""All compressed chunks may hold so much, and BYTES_PER_BYTE more for each byte of the file."""
 FREE_RECORDS, RECORDS_PER_BYTE = 100_000, 1
 """So many records, likewise: each takes some time and memory, however short, and its time
 alone a byte or more."""

@@ -16,6 +16,8 @@ class BagFileCounts(NamedTuple):
 
     name: str
     counts: Counts
+    size: int = 0
+    """Bytes; 0: not known."""
 
 
 class BagTopic(NamedTuple):

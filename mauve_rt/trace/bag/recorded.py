@@ -76,9 +76,29 @@ PackedChannel = tuple[int, int, int, bytes]
 """Channel, first and last log time, entries of its message index."""
 
 
+COMPRESSIONS = ("none", "zstd")
+"""Of the chunks of a bag's files."""
+FILES_OF_A_BAG = 4
+"""A bag of limited size has so many files at least, so that a deletion leaves most of it."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Split:
-    """When a bag goes on in a new file: whichever comes first; 0: never for that reason."""
+    """When a bag goes on in a new file, whichever comes first, and the size of all; 0: no limit."""
 
     after_s: float = 60.0
     after_bytes: int = 0
+    max_bytes: int = 0
+    """Of all files: beyond it the oldest one is deleted."""
+
+    @property
+    def file_bytes(self) -> int:
+        """Size at which a file ends; of a bag of limited size there is one; 0: any."""
+        return self.after_bytes or self.max_bytes // FILES_OF_A_BAG
+
+    def misfit(self) -> str:
+        """Say what is wrong with the limits; empty where nothing is."""
+        if 0 < self.max_bytes < 2 * self.after_bytes:
+            expected = f"expected at least twice the size of a file, {2 * self.after_bytes:,} bytes"
+            return f"{expected}, found {self.max_bytes:,}; choose a larger limit or smaller files"
+        return ""

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from mauve_rt.counts import counted
+from mauve_rt.trace.bag.deletion import deleted_of
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata
 from mauve_rt.trace.bag.files import bag_files, is_sqlite
 from mauve_rt.trace.bag.mcap_repair import FileState, examine
@@ -33,6 +34,8 @@ class BagState:
     """What the last file, which is never older than metadata.yaml, tells beside; else that."""
     unreadable: Mapping[Path, str]
     """Files of which nothing can be read, beside others, and why."""
+    removed: tuple[Path, ...] = ()
+    """Files that the recorder took out of the bag for its size, and a kill came before it deleted them."""
 
     @property
     def is_finished(self) -> bool:
@@ -70,6 +73,8 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
         except TraceError as error:
             if len(files) == 1:
                 raise
+            if not file.exists():  # the recorder has just deleted it: the bag has a limit of size
+                continue
             unreadable[file] = str(error).removeprefix(f"bag file {file}: ")
     custom_data: Mapping[str, str] = {}
     for state in states:
@@ -79,13 +84,16 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
     if not custom_data:
         with contextlib.suppress(TraceError):
             custom_data = _custom_data(_read_metadata(path))
-    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data, unreadable)
+    removed = _removed(path, states, custom_data)
+    states = [state for state in states if state.path not in removed]
+    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data, unreadable, removed)
 
 
 def repair_bag(state: BagState) -> None:
     """Make a finished bag of it: what is whole stays, what a kill left half-written is cut off.
 
     A file of which nothing can be read gets another ending, so that no reader takes it for one of the bag.
+    A file that the recorder was about to delete is deleted.
 
     Raises:
         TraceError: it cannot be written.
@@ -97,8 +105,10 @@ def repair_bag(state: BagState) -> None:
     try:
         for path in state.unreadable:
             path.rename(path.with_name(f"{path.name}.unreadable"))
+        for path in state.removed:
+            path.unlink(missing_ok=True)
     except OSError as error:
-        msg = f"bag {state.path}: a file cannot be renamed ({error.strerror})"
+        msg = f"bag {state.path}: a file cannot be renamed or deleted ({error.strerror})"
         raise TraceError(msg) from error
     if not state.is_finished and state.path.is_dir():
         _write_metadata(state)
@@ -112,14 +122,31 @@ def _damage(file: FileState) -> str:
     return f"{found}; {whole}, not the {file.left_out_bytes:,} bytes after them"
 
 
+def _removed(path: Path, states: Sequence[FileState], custom_data: Mapping[str, str]) -> tuple[Path, ...]:
+    """Return the files that both the custom data and metadata.yaml tell to be no longer part of the bag."""
+    deleted = deleted_of(custom_data)
+    if deleted is None:
+        return ()
+    try:
+        named = _names(_read_metadata(path))
+    except TraceError:
+        return ()
+    files = [state.path for state in states]
+    return tuple(file for file in files if deleted.is_of(file.name) and named and file.name not in named)
+
+
+def _names(metadata: Mapping[str, Any]) -> list[str]:
+    listed = metadata.get("relative_file_paths")
+    return [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
+
+
 def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
     """Tell where metadata.yaml promises other than the files hold."""
     try:
         told = _read_metadata(path)
     except TraceError as error:
         return str(error)
-    listed = told.get("relative_file_paths")
-    names = [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
+    names = _names(told)
     found = [file.name for file in _named(files)]
     if names != found:
         return f"names the files {', '.join(names) or '(none)'}, there are {', '.join(found)}"

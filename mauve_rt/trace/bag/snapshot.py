@@ -52,6 +52,12 @@ def snapshot_bag(bag: Path, out: Path, *, progress: Progress = silent) -> BagSta
 
 def _copy(file: Path, to: Path) -> None:
     for _ in range(_TRIES):
-        shutil.copyfile(file, to)
+        try:
+            shutil.copyfile(file, to)
+        except FileNotFoundError:
+            if to.parent.exists() and file.parent.exists():  # deleted for the size of the bag
+                to.unlink(missing_ok=True)
+                return
+            raise
         if examine(to).is_finished:
             return

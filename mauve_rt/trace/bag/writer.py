@@ -4,16 +4,17 @@ import os
 import shutil
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Self
 
 import mauve_rt
+from mauve_rt.trace.bag.compression import compressor
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata, sync_folder
 from mauve_rt.trace.bag.mcap_file import McapFile
-from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, BagTopic, metadata_text, named_files
+from mauve_rt.trace.bag.metadata import CUSTOM_DATA, BagFileCounts, metadata_text, named_files
 from mauve_rt.trace.bag.recorded import ReceivedBatch, TopicQos
+from mauve_rt.trace.bag.written_topic import WrittenTopic, counted_topic, declare_channel, declare_schema
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
 from mauve_rt.unfinished import beside
@@ -21,14 +22,6 @@ from mauve_rt.unfinished import beside
 _FILE_ROOM_BYTES, _METADATA_ROOM_BYTES = 8192, 4096
 """Kept in a file, and in metadata.yaml, for the reason of an interruption and the counts of a hundred topics
 that came just before it."""
-
-
-@dataclass(frozen=True)
-class _Topic:
-    name: str
-    definition: Definition
-    qos: str
-    channel_id: int
 
 
 class BagWriter:
@@ -49,13 +42,14 @@ class BagWriter:
         ros_distro: str = "jazzy",
         disk: Disk | None = None,
         keeps_room: bool = False,
+        compression: str = "none",
     ) -> None:
         """Create the folder (and its parents) with an empty, finished bag in it; closes `disk` with the bag.
 
-        `keeps_room`: until the end, for write_into_room().
+        `keeps_room`: until the end, for write_into_room(); `compression`: of the chunks, one of COMPRESSIONS.
 
         Raises:
-            TraceError: the folder exists already, or cannot be written.
+            TraceError: the folder exists already, or cannot be written; or the compression is not installed.
 
         """
         self.directory = Path(directory)
@@ -64,13 +58,17 @@ class BagWriter:
         self._keeps_room = keeps_room
         self._custom_data: dict[str, str] = {}
         self._schemas: dict[str, tuple[int, Definition]] = {}
-        self._topics: dict[str, _Topic] = {}
+        self._topics: dict[str, WrittenTopic] = {}
         self._complete: list[BagFileCounts] = []  # files that were split off
+        self._removed: list[BagFileCounts] = []  # of these, no longer named by the next metadata.yaml
+        self._to_delete: list[BagFileCounts] = []  # metadata.yaml names them no longer
+        self._number = 0  # of the present file
         self._stale = True  # metadata.yaml does not tell what the files hold
         self._told: set[str] = set()  # the files that metadata.yaml names
         self._opened = ExitStack()
         self._flushed_ns = 0  # latest log time of all that was flushed
         try:
+            self._compress = compressor(compression)
             self._create()
         except TraceError:
             self._disk.close()
@@ -117,6 +115,16 @@ class BagWriter:
         return self._file.size
 
     @property
+    def total_bytes(self) -> int:
+        """Bytes of all files that the next metadata.yaml names."""
+        return self._file.size + sum(file.size for file in self._complete)
+
+    @property
+    def file_name(self) -> str:
+        """Name of the present file."""
+        return self._file.path.name
+
+    @property
     def file_start_ns(self) -> int:
         """Log time of the present file's first flushed message; 0 when there is none."""
         return self._file.flushed.start_ns
@@ -144,10 +152,10 @@ class BagWriter:
             raise TraceError(msg)
         if type_name not in self._schemas:
             defined = Definition(type_name, definition, "") if definition else find_definition(type_name)
-            self._schemas[type_name] = (_declare_schema(self._file, defined), defined)
+            self._schemas[type_name] = (declare_schema(self._file, defined), defined)
         schema_id, defined = self._schemas[type_name]
-        topic = _Topic(name, defined, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
-        _declare_channel(self._file, topic, schema_id)
+        topic = WrittenTopic(name, defined, (qos or TopicQos()).as_yaml(), len(self._topics) + 1)
+        declare_channel(self._file, topic, schema_id)
         self._topics[name] = topic
         self._stale = True
 
@@ -190,10 +198,44 @@ class BagWriter:
 
         """
         self._flush(sync=True)
-        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
-        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        before, self._file = self._file, self._new_file(self.directory, self._number + 1)
+        self._number += 1
+        self._complete.append(BagFileCounts(before.path.name, before.flushed, before.size))
         self._declare()
         before.close()
+
+    def remove_oldest(self) -> BagFileCounts | None:
+        """Leave out the oldest file with the next flush, which names it no longer; None: there is no other.
+
+        Then delete_removed() deletes it. A kill between both leaves a file that metadata.yaml does not name.
+        """
+        if not self._complete or not (self._file.is_waiting or self._file.flushed.messages):
+            return None
+        removed = self._complete.pop(0)
+        self._removed.append(removed)
+        self._stale = True
+        return removed
+
+    def messages_in(self, file: BagFileCounts) -> dict[str, int]:
+        """How many messages of each topic a file holds."""
+        by_channel = file.counts.by_channel
+        return {name: by_channel.get(topic.channel_id, 0) for name, topic in self._topics.items()}
+
+    def delete_removed(self) -> None:
+        """Delete the files that a flush left out.
+
+        Raises:
+            DiskError: one cannot be deleted; the next call tries again.
+
+        """
+        while self._to_delete:
+            path = self.directory / self._to_delete[0].name
+            try:
+                path.unlink(missing_ok=True)
+            except OSError as error:
+                msg = f"bag file {path}: cannot be deleted ({error.strerror})"
+                raise DiskError(msg) from error
+            del self._to_delete[0]
 
     def drop_waiting(self) -> dict[str, int]:
         """Give up what no flush could write; how many messages it was, by topic. Only go_on() helps then."""
@@ -226,8 +268,8 @@ class BagWriter:
             DiskError: as flush; the bag is as before.
 
         """
-        before, self._file = self._file, self._new_file(self.directory, len(self._complete) + 1)
-        self._complete.append(BagFileCounts(before.path.name, before.flushed))
+        before, self._file = self._file, self._new_file(self.directory, self._number + 1)
+        self._complete.append(BagFileCounts(before.path.name, before.flushed, before.size))
         try:
             self._declare()
             begin()
@@ -238,13 +280,14 @@ class BagWriter:
             self._complete.pop()
             self._file = before
             raise
+        self._number += 1
         before.abort()
 
     def _declare(self) -> None:
         for _, definition in self._schemas.values():  # in the same order: they get the same numbers
-            _declare_schema(self._file, definition)
+            declare_schema(self._file, definition)
         for topic in self._topics.values():
-            _declare_channel(self._file, topic, self._schemas[topic.definition.type_name][0])
+            declare_channel(self._file, topic, self._schemas[topic.definition.type_name][0])
         self._stale = True
 
     def flush(self) -> None:
@@ -273,10 +316,17 @@ class BagWriter:
         if self._custom_data:
             self._file.set_metadata(CUSTOM_DATA, self._custom_data)
         metadata = self._metadata if self._stale else None
-        if is_last:
-            self._file.finish(metadata=metadata)
-        else:
-            self._file.flush(metadata=metadata, sync=sync)
+        try:
+            if is_last:
+                self._file.finish(metadata=metadata)
+            else:
+                # What names a file no longer is on the disk before the file is deleted.
+                self._file.flush(metadata=metadata, sync=sync or bool(self._removed))
+        except TraceError:
+            self._complete[:0], self._removed = self._removed, []  # as on the disk
+            raise
+        self._to_delete += self._removed
+        self._removed = []
         if self._stale:
             self._told = {file.name for file in self._files()}
         self._stale = False
@@ -324,30 +374,23 @@ class BagWriter:
         path = directory / f"{self.directory.name}_{number}.mcap"
         library = f"mauve_rt {mauve_rt.__version__}"
         room_bytes = _FILE_ROOM_BYTES if self._keeps_room else 0
-        return McapFile(path, profile="ros2", library=library, disk=self._disk, room_bytes=room_bytes)
+        return McapFile(
+            path,
+            profile="ros2",
+            library=library,
+            disk=self._disk,
+            room_bytes=room_bytes,
+            compress=self._compress,
+        )
 
     def _metadata(self, *, in_place: bool = False, size: int = 0) -> Metadata:
         files = self._files()
         data = metadata_text(
             files,
-            [_counted(topic, files) for topic in self._topics.values()],
+            [counted_topic(topic, files) for topic in self._topics.values()],
             custom_data=self._custom_data,
             ros_distro=self._ros_distro,
             room_bytes=_METADATA_ROOM_BYTES if self._keeps_room and not in_place else 0,
             size=size,
         )
         return Metadata(self._folder, data, in_place)
-
-
-def _counted(topic: _Topic, files: Sequence[BagFileCounts]) -> BagTopic:
-    messages = sum(file.counts.by_channel.get(topic.channel_id, 0) for file in files)
-    return BagTopic(topic.name, topic.definition.type_name, topic.qos, topic.definition.type_hash, messages)
-
-
-def _declare_schema(file: McapFile, definition: Definition) -> int:
-    return file.add_schema(definition.type_name, encoding="ros2msg", data=definition.text.encode())
-
-
-def _declare_channel(file: McapFile, topic: _Topic, schema_id: int) -> None:
-    metadata = {"offered_qos_profiles": topic.qos, "topic_type_hash": topic.definition.type_hash}
-    file.add_channel(topic.name, schema_id=schema_id, encoding="cdr", metadata=metadata)

@@ -9,7 +9,8 @@ from mauve_rt.trace.format.mcap_records import HEAD, Opcode, record
 
 _MESSAGE_HEAD = struct.Struct("<BQHIQQ")  # opcode, length, channel, sequence, log time, publish time
 _MESSAGE_FIXED_BYTES = 22
-_CHUNK_HEAD = struct.Struct("<QQQIIQ")  # first, last log time, size, CRC, no compression (0), size
+_CHUNK_HEAD = struct.Struct("<QQQII")  # first, last log time, size, CRC, bytes of the compression's name
+_SIZE = struct.Struct("<Q")
 _INDEX_HEAD = struct.Struct("<BQHI")  # opcode, length, channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the chunk
 
@@ -75,14 +76,18 @@ class PendingChunk:
             self.counts.add_many(channel_id, messages, start_ns=start_ns, end_ns=end_ns)
             self._indexes.setdefault(channel_id, bytearray()).extend(entries)
 
-    def build(self, offset: int) -> tuple[list[bytes | bytearray], bytes]:
-        """Return the chunk and its message indexes for this place in the file, in parts, and its index."""
-        size = len(self.records)
-        head = _CHUNK_HEAD.pack(
-            self.counts.start_ns, self.counts.end_ns, size, zlib.crc32(self.records), 0, size
-        )
-        head = HEAD.pack(Opcode.CHUNK, len(head) + size) + head
-        chunk_length = len(head) + size
+    def build(
+        self, offset: int, data: bytes | bytearray, compression: str
+    ) -> tuple[list[bytes | bytearray], bytes]:
+        """Return the chunk and its message indexes for this place in the file, in parts, and its index.
+
+        `data`: the records, compressed as `compression` says; empty: as they are.
+        """
+        size, name, crc = len(self.records), compression.encode(), zlib.crc32(self.records)
+        head = _CHUNK_HEAD.pack(self.counts.start_ns, self.counts.end_ns, size, crc, len(name))
+        head += name + _SIZE.pack(len(data))
+        head = HEAD.pack(Opcode.CHUNK, len(head) + len(data)) + head
+        chunk_length = len(head) + len(data)
         indexes = bytearray()
         index_offsets: dict[int, int] = {}
         for channel_id, entries in self._indexes.items():
@@ -93,12 +98,12 @@ class PendingChunk:
             Opcode.CHUNK_INDEX,
             chunk_length=chunk_length,
             chunk_start_offset=offset,
-            compression="",
-            compressed_size=size,
+            compression=compression,
+            compressed_size=len(data),
             message_end_time=self.counts.end_ns,
             message_index_length=len(indexes),
             message_index_offsets=index_offsets,
             message_start_time=self.counts.start_ns,
             uncompressed_size=size,
         )
-        return [head, self.records, indexes], index
+        return [head, data, indexes], index

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from mauve_rt.counts import counted
+from mauve_rt.trace.bag.deletion import deleted_of
 from mauve_rt.trace.bag.files import is_sqlite
 from mauve_rt.trace.bag.repair import BagState, examine_bag
 from mauve_rt.trace.format.records import Kind
@@ -16,13 +17,7 @@ from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import (
-    DROPPED_MESSAGES,
-    INTERRUPTIONS,
-    Entry,
-    Interruption,
-    ledger_of,
-)
+from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, INTERRUPTIONS, Entry, Interruption, ledger_of
 
 
 @dataclass(frozen=True)
@@ -76,6 +71,7 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         for name, rows in trace.records.items()
         for split in split_changes(rows)
     ]
+    found += [Finding(text) for text in _deleted(state)]
     return found + _notes(trace) + [Finding(text) for text in _not_known(ledger)]
 
 
@@ -119,6 +115,17 @@ def _interruption_words(one: Interruption) -> str:
     paused = f"the recording paused for {(one.until_ns - one.from_ns) / 1e9:.1f} s"
     what = paused if one.until_ns else "the recording ended by itself"
     return f"{what} ({one.reason}): {counted(one.records, 'record')} lost"
+
+
+def _deleted(state: BagState) -> Iterator[str]:
+    deleted = deleted_of(state.custom_data)
+    if deleted is not None:
+        yield deleted.text
+    for path in state.removed:
+        yield (
+            f"{path.name}: no longer part of the bag: max_size_bytes removed it, and the recorder ended "
+            f"before it deleted the file. Delete it: mauve trace repair {state.path}"
+        )
 
 
 def _missing(state: BagState, ledger: Mapping[str, Entry]) -> Iterator[str]:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mauve_rt.trace.bag.deletion import Deleted, deleted_of
 from mauve_rt.trace.bag.files import bag_files
 from mauve_rt.trace.bag.mcap_library import Channel, Message
 from mauve_rt.trace.bag.mcap_scan import McapScan
@@ -25,7 +26,7 @@ from mauve_rt.trace.reading.records_read import NO_RECORDS, RecordsRead
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE, Shadow
 from mauve_rt.trace.reading.stored_messages import StoredMessages, scan_of
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.trace_bag import Entry, ledger_of
+from mauve_rt.trace.recording.ledger import Entry, ledger_of
 
 if TYPE_CHECKING:
     from mauve_rt.trace.bag.sqlite_scan import SqliteScan
@@ -53,21 +54,31 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
 
     """
     files = bag_files(Path(path))
-    files = [file for file in files if file.stat().st_size] or files  # a kill leaves one just begun empty
+    sizes = {file: size for file in files if (size := _size(file))}  # a kill leaves one just begun empty
+    sizes = sizes or dict.fromkeys(files, 0)
     content = _Content(Path(path))
-    sizes = [file.stat().st_size for file in files]
-    done, total = 0, max(sum(sizes), 1)
-    for file, size in zip(files, sizes, strict=True):
+    done, total = 0, max(sum(sizes.values()), 1)
+    for file, size in sizes.items():
+        if len(sizes) > 1 and not file.exists():  # deleted since, for the size of the bag
+            continue
         stored = StoredMessages(file)
         with scan_of(file) as scan:
             for counts, found in stored.first_pass(scan):
                 content.add(scan, counts, found)
                 progress((done + scan.whole_bytes) / total, "reading")
             content.ledger = ledger_of(scan.custom_data) or content.ledger
+            content.deleted = deleted_of(scan.custom_data) or content.deleted
             content.files.append(BagFile(file, scan.library, scan.whole_bytes, scan.damage))
         content.stored.append(stored)
         done += size
     return content.trace()
+
+
+def _size(file: Path) -> int:
+    try:
+        return file.stat().st_size
+    except FileNotFoundError:  # the recorder has just deleted it: the bag has a limit of size
+        return 0
 
 
 class _Content:
@@ -77,6 +88,7 @@ class _Content:
         self.files: list[BagFile] = []
         self.stored: list[StoredMessages] = []
         self.ledger: dict[str, Entry] = {}  # as the last file tells
+        self.deleted: Deleted | None = None  # likewise
         self._path = path
         self._topics: set[str] = set()
         self._all_topics: dict[str, tuple[str, int]] = {}
@@ -179,6 +191,7 @@ class _Content:
             files=tuple(self.files),
             topics=self._all_topics,
             ledger=self.ledger,
+            deleted=(self.deleted,) if self.deleted is not None else (),
             kinds=self._kinds,
             decisions=traced_decisions(decided, self._names, self._kinds),
             shadow_reports=tuple(

@@ -26,11 +26,12 @@ from mauve_rt.trace.reading.facts import (
 from mauve_rt.trace.reading.shadows import Shadow, last_reports
 
 if TYPE_CHECKING:
+    from mauve_rt.trace.bag.deletion import Deleted
     from mauve_rt.trace.reading.frames import Frames
     from mauve_rt.trace.reading.messages import PayloadSource
     from mauve_rt.trace.reading.typed_records import Record
     from mauve_rt.trace.reading.values import TraceValues
-    from mauve_rt.trace.recording.trace_bag import Entry
+    from mauve_rt.trace.recording.ledger import Entry
 
 _CLOCK_STEP_NS = 500_000_000  # a clock that is slewed gains at most 0.5 ms in a second
 _SAME_CLOCK_NS = 1_000_000_000  # (realtime - monotonic) of two machines differs by more than this
@@ -60,6 +61,8 @@ class Trace:
     """Of every topic in the bag, the trace's own too: type and number of messages."""
     ledger: Mapping[str, "Entry"] = field(default_factory=dict)
     """What became of the messages of each topic; empty where the bag does not tell."""
+    deleted: tuple["Deleted", ...] = ()
+    """What the limit of a bag's size deleted of its begin: one of each bag that lacks its begin."""
     kinds: Mapping[int, RecordKind] = field(default_factory=kinds_known)
     """What the kinds of records are called, as told in the bag: newer ones than this reader's among them."""
     decisions: tuple[TracedDecision, ...] = ()
@@ -210,6 +213,7 @@ def merge_traces(traces: Mapping[str, Trace]) -> Trace:
         files=tuple(file for trace in traces.values() for file in trace.files),
         topics=_all_topics(traces.values()),
         ledger=_all_entries(traces.values()),
+        deleted=tuple(one for trace in traces.values() for one in trace.deleted),
         kinds={number: kind for trace in traces.values() for number, kind in trace.kinds.items()},
         decisions=_all_decisions(traces),
         shadow_reports=tuple(

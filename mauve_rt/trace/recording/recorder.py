@@ -4,24 +4,16 @@ import contextlib
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
-from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
 from mauve_rt.trace.errors import DiskError, TraceError
+from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, Entry
+from mauve_rt.trace.recording.sources import Drain, MessageSource, TopicSource, TraceSource
 from mauve_rt.trace.recording.tap import Tap
-from mauve_rt.trace.recording.trace_bag import (
-    BATCHES,
-    DROPPED_MESSAGES,
-    NAMES,
-    Drain,
-    Entry,
-    MessageSource,
-    TopicSource,
-    TraceBag,
-    TraceSource,
-)
+from mauve_rt.trace.recording.trace_bag import BATCHES, NAMES, TraceBag
 
 __all__ = [
     "BATCHES",
@@ -79,6 +71,7 @@ class Recorder:
         topics: TopicSource | None = None,
         keeper: Path | None = None,
         waits_for_room: bool = False,
+        compression: str = "none",
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -95,6 +88,7 @@ class Recorder:
             topics: of other nodes; it is stopped when the recording ends by itself.
             keeper: the program that writes the files (`native_program`), so that a kill of this process finds
                 no write half done; without one this process writes.
+            compression: of the chunks of the files, one of COMPRESSIONS; done by the recorder thread.
             waits_for_room: a disk that refuses to write pauses the recording; else it ends the recording.
 
         Raises:
@@ -113,7 +107,13 @@ class Recorder:
         self._refused: Counter[str] = Counter()  # of topics of other nodes
         disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
         self._bag = TraceBag(
-            source, directory, node_name=node_name, on_error=self._report, split=split, disk=disk
+            source,
+            directory,
+            node_name=node_name,
+            on_error=self._report,
+            split=split,
+            disk=disk,
+            compression=compression,
         )
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []
@@ -297,12 +297,12 @@ class Recorder:
         """Count what came: it is lost."""
         with self._lock:
             waiting, self._waiting, self._waiting_bytes = self._waiting, [], 0
-        drain, taken, batch = self._tap.take()
+        drain, taken, batch, topics = self._tap.take()
         more = Counter(message.topic for message in taken)
         if self._topics is not None and batch is not None:
-            for topic, count in zip(self._topics.topics, batch.sizes, strict=True):
+            for topic, count in zip(topics, batch.sizes, strict=True):
                 self._refused[topic.name] += count
-            self._others = self._entries(self._topics, batch)
+            self._others = self._entries(topics, batch, numbered=self._topics.numbered)
         with self._lock:
             self._received += more
             self._lost += more + Counter(message.topic for message in waiting)
@@ -341,30 +341,32 @@ class Recorder:
                 self._received.copy(),
                 self._lost.copy(),
             )  # with what waits: the bag tells of no more
-        drain, taken, batch = self._tap.take()
+        drain, taken, batch, topics = self._tap.take()
         more = Counter(message.topic for message in taken)
         waiting += taken
         if architecture:
             self._bag.tell_architecture(architecture, drain)
         refused = self._bag.write(drain, waiting, whole=True)
         if self._topics is not None and batch is not None:
-            self._refused += self._bag.write_received(batch, self._topics.topics, drain)
-            self._others = self._entries(self._topics, batch)
+            self._refused += self._bag.write_received(batch, topics, drain)
+            self._others = self._entries(topics, batch, numbered=self._topics.numbered)
         with self._lock:
             self._received += more
             self._lost += refused
         self._bag.tell_ledger(received + more, lost + refused, self._others)
         self._bag.tell_dropped(self.dropped_messages)
 
-    def _entries(self, source: TopicSource, batch: ReceivedBatch) -> dict[str, Entry]:
+    def _entries(
+        self, topics: Sequence[ReceivedTopic], batch: ReceivedBatch, *, numbered: bool
+    ) -> dict[str, Entry]:
         return {
             topic.name: Entry(
                 received=received,
                 lost=lost + self._refused[topic.name],
                 lost_before=lost_before,
-                numbered=source.numbered,
+                numbered=numbered,
             )
-            for topic, (received, lost_before, lost) in zip(source.topics, batch.counts, strict=True)
+            for topic, (received, lost_before, lost) in zip(topics, batch.counts, strict=True)
         }
 
     def _report(self, text: str) -> None:

@@ -4,8 +4,8 @@ import threading
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from mauve_rt.trace.bag.recorded import ReceivedBatch, SentMessage
-from mauve_rt.trace.recording.trace_bag import Drain, Drained, MessageSource, TopicSource, TraceSource
+from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage
+from mauve_rt.trace.recording.sources import Drain, Drained, MessageSource, TopicSource, TraceSource
 
 
 class Taken(NamedTuple):
@@ -15,6 +15,8 @@ class Taken(NamedTuple):
     messages: Sequence[SentMessage]
     received: ReceivedBatch | None
     """Of topics of other nodes; None: there are none to record, or the last ones are taken."""
+    topics: Sequence[ReceivedTopic] = ()
+    """Those of `received`, in its order."""
 
 
 class Tap:
@@ -89,7 +91,9 @@ class Tap:
         # Messages before the drain: then no message is later than the clock pair that maps it.
         messages = self._messages.take_messages() if self._messages is not None else ()
         received = self._topics.take() if self._topics is not None else None
-        return Taken(self._source.drain_trace(), messages, received)
+        # Since then there may be more of them.
+        topics = self._topics.topics[: len(received.sizes)] if self._topics and received is not None else ()
+        return Taken(self._source.drain_trace(), messages, received, topics)
 
     def _count_dropped(self) -> int:
         return self._messages.dropped_messages() - self._dropped_before if self._messages is not None else 0

@@ -6,24 +6,27 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
+from mauve_rt.trace.bag.deletion import DELETED, Deleted
 from mauve_rt.trace.bag.disk import Disk
+from mauve_rt.trace.bag.metadata import BagFileCounts
 from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
+from mauve_rt.trace.recording.ledger import (
+    DROPPED_MESSAGES,
+    INTERRUPTIONS,
+    LEDGER,
+    Entry,
+    Interruption,
+)
+from mauve_rt.trace.recording.sources import Drain, TraceWords
 
 BATCHES = "trace/batches"
 NAMES = "trace/names"
 ARCHITECTURE = "trace/architecture"
-DROPPED_MESSAGES = "mauve_dropped_messages"
-"""Key in the custom data of metadata.yaml: messages given to record() that did not get into the bag."""
-LEDGER = "mauve_topics"
-"""Key in the custom data of metadata.yaml: a JSON object of each topic's Entry. What is in the bag of it is
-`received - lost + repeated` messages."""
-INTERRUPTIONS = "mauve_interruptions"
-"""Key in the custom data of metadata.yaml: a JSON list of each Interruption."""
 _MOST_INTERRUPTIONS, _LONGEST_REASON = 16, 400
 _RECORD_BYTES = 48
 _KEPT_MESSAGES, _KEPT_BYTES = 16, 8 * 1024 * 1024  # of a latched topic of others, for the files to come
@@ -33,141 +36,24 @@ _ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
 _LATCHED = TopicQos(depth=1, transient_local=True)
 
 
-class Drain(Protocol):
-    """What one drain of the kernel's rings yields (`mauve_rt._kernel.TraceDrain`)."""
+class _Gone(NamedTuple):
+    """What the limit of the bag's size deleted."""
 
-    @property
-    def records(self) -> bytes:
-        """Records, 48 bytes each."""
+    deleted: Deleted
+    messages: Counter[str] = Counter()  # noqa: RUF012 - never changed
 
-    @property
-    def written(self) -> list[int]:
-        """Per component: records ever offered."""
-
-    @property
-    def dropped(self) -> list[int]:
-        """Per component: of these, lost because the ring was full."""
-
-    @property
-    def monotonic_ns(self) -> int:
-        """Time of the drain, CLOCK_MONOTONIC."""
-
-    @property
-    def realtime_ns(self) -> int:
-        """The same instant, CLOCK_REALTIME."""
-
-
-class Drained(NamedTuple):
-    """A drain as a value."""
-
-    records: bytes
-    written: list[int]
-    dropped: list[int]
-    monotonic_ns: int
-    realtime_ns: int
-
-
-class TraceWords(Protocol):
-    """What the numbers in records stand for; all that a bag asks for itself."""
-
-    def trace_components(self) -> list[str]:
-        """Words that `component` of a record refers to."""
-
-    def trace_names(self) -> list[str]:
-        """Words that `name` of a record refers to."""
-
-
-class TraceSource(TraceWords, Protocol):
-    """The part of `mauve_rt._kernel.Host` that the recorder uses."""
-
-    def collect_trace(self, period_ns: int) -> None:
-        """Empty the rings so often, by a thread without the interpreter, for drain_trace(); 0: no longer."""
-
-    def drain_trace(self) -> Drain:
-        """Take everything out of the rings, and what was collected."""
-
-
-class Entry(NamedTuple):
-    """One topic in the ledger of a bag."""
-
-    received: int = 0
-    """Messages that came and were to be recorded."""
-    lost: int = 0
-    """Of these, not in the bag."""
-    repeated: int = 0
-    """Messages of a latched topic that later files begin with, as well."""
-    lost_before: int = 0
-    """Of a topic of other nodes: messages that were sent and did not come, as far as that is known."""
-    numbered: bool | None = None
-    """Of a topic of other nodes: whether its messages are numbered, so that gaps are known. Else null."""
-
-    @property
-    def recorded(self) -> int:
-        """What the bag has of it."""
-        return self.received - self.lost + self.repeated
-
-    def plus(self, other: "Entry") -> "Entry":
-        """Return both together: of a topic that is recorded twice, in one bag or in several."""
-        known = {self.numbered, other.numbered} - {None}
-        return Entry(
-            self.received + other.received,
-            self.lost + other.lost,
-            self.repeated + other.repeated,
-            self.lost_before + other.lost_before,
-            all(known) if known else None,
+    def plus(self, file: BagFileCounts, records: int, messages: Mapping[str, int]) -> "_Gone":
+        """Return it with a further file."""
+        before = self.deleted
+        counts = file.counts
+        deleted = before._replace(
+            files=before.files + 1,
+            records=before.records + records,
+            from_ns=before.from_ns or counts.start_ns,
+            until_ns=max(before.until_ns, counts.end_ns),
+            last_file=file.name,
         )
-
-
-def ledger_of(custom_data: Mapping[str, str]) -> dict[str, Entry]:
-    """Return what the custom data of a bag tells of each topic; nothing in a bag of an earlier version."""
-    try:
-        told = json.loads(custom_data.get(LEDGER, "{}"))
-        return {topic: Entry(**fields) for topic, fields in told.items()}
-    except (ValueError, TypeError, AttributeError):  # somebody else wrote it
-        return {}
-
-
-class TopicSource(Protocol):
-    """Topics of other nodes, received elsewhere."""
-
-    @property
-    def topics(self) -> Sequence[ReceivedTopic]:
-        """In the order of their numbers."""
-
-    @property
-    def numbered(self) -> bool:
-        """Whether gaps in what a writer sent are known."""
-
-    def take(self) -> ReceivedBatch:
-        """What came since the last call."""
-
-    def stop(self) -> None:
-        """Receive no longer; the last messages stay for take(). May be called again."""
-
-
-class Interruption(NamedTuple):
-    """A time in which nothing got into the bag."""
-
-    reason: str
-    from_ns: int
-    """CLOCK_REALTIME."""
-    until_ns: int = 0
-    """0: the bag ends with it."""
-    records: int = 0
-    """Trace records that are not in the bag; messages are in the ledger."""
-
-
-class MessageSource(Protocol):
-    """Messages kept elsewhere until the recorder takes them."""
-
-    def keep_messages(self, *, on: bool) -> None:
-        """Keep them from now on, or no longer."""
-
-    def take_messages(self) -> Sequence[SentMessage]:
-        """What was sent or received since the last call."""
-
-    def dropped_messages(self) -> int:
-        """Messages that found no room to wait, ever."""
+        return _Gone(deleted, self.messages + Counter(messages))
 
 
 class TraceBag:
@@ -190,6 +76,7 @@ class TraceBag:
         on_error: Callable[[str], None],
         split: Split | None = None,
         disk: Disk | None = None,
+        compression: str = "none",
     ) -> None:
         """Create the bag; nothing is drained yet.
 
@@ -200,6 +87,7 @@ class TraceBag:
             on_error: called at most once for each type that cannot be recorded, with one line.
             split: when it goes on in a new file; after a minute unless said otherwise.
             disk: closed with the bag.
+            compression: of the chunks of its files, one of COMPRESSIONS.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -209,7 +97,7 @@ class TraceBag:
         self._split = split or Split()
         self._node_name = node_name.rstrip("/")
         self._on_error = on_error
-        self._bag = BagWriter(directory, disk=disk, keeps_room=True)
+        self._bag = BagWriter(directory, disk=disk, keeps_room=True, compression=compression)
         try:
             self._bag.add_topic(self._topic(NAMES), _NAMES_TYPE, qos=_LATCHED)
             self._bag.add_topic(self._topic(BATCHES), _BATCH_TYPE)
@@ -225,6 +113,9 @@ class TraceBag:
         self._repeated_waiting: Counter[str] = Counter()  # for the next flush
         self._records_waiting = 0
         self._dropped_flushed = 0  # by the rings
+        self._entries: dict[str, Entry] = {}  # but for what this class adds
+        self._records_in: Counter[str] = Counter()  # by file
+        self._gone = _Gone(Deleted(self._split.max_bytes))
         self._interruptions: deque[Interruption] = deque(maxlen=_MOST_INTERRUPTIONS)
         self._is_interrupted = False
         self._last: Drain | None = None
@@ -247,7 +138,9 @@ class TraceBag:
         A batch without records (it tells of losses) is written if `whole`.
         """
         self._last = drain
-        self._records_waiting += len(drain.records) // _RECORD_BYTES
+        count = len(drain.records) // _RECORD_BYTES
+        self._records_waiting += count
+        self._records_in[self._bag.file_name] += count
         self._write_names(drain)
         if drain.records or messages or whole:
             self._write_batch(drain, drain.records)
@@ -297,15 +190,23 @@ class TraceBag:
         for topic, entry in (others or {}).items():
             # Own as well: a resource was bound to it while it was recorded.
             told[topic] = entry.plus(told.get(topic, Entry()))
+        self._entries = told
+        self._tell_ledger()
+
+    def _tell_ledger(self) -> None:
+        gone = self._gone
         entries = {
-            topic: entry._replace(repeated=self._repeated[topic])._asdict() for topic, entry in told.items()
+            topic: entry._replace(repeated=self._repeated[topic], deleted=gone.messages[topic])._asdict()
+            for topic, entry in self._entries.items()
         }
         self._bag.set_custom_data(LEDGER, json.dumps(entries))
+        if gone.deleted.files:
+            messages = sum(gone.messages[topic] for topic in self._entries)
+            self._bag.set_custom_data(DELETED, json.dumps(gone.deleted._replace(messages=messages)._asdict()))
 
     def flush(self) -> None:
         """Make the bag a finished one of all that was written; go on in a new file when it is time."""
-        self._bag.flush()
-        self._note_flushed()
+        self._write_out(self._bag.flush)
         last = self._last
         if last is not None and self._is_time_to_split(self._log_time_ns(last, last.monotonic_ns)):
             self._bag.split()
@@ -313,8 +214,27 @@ class TraceBag:
 
     def finish(self) -> None:
         """Flush a last time. Then abort() closes the bag."""
-        self._bag.finish()
+        self._write_out(self._bag.finish)
+
+    def _write_out(self, flush: Callable[[], None]) -> None:
+        """Flush; where the bag is too large, without the oldest files, which are deleted afterwards."""
+        before = self._gone
+        while 0 < self._split.max_bytes < self._bag.total_bytes:
+            removed = self._bag.remove_oldest()
+            if removed is None:
+                break
+            records = self._records_in[removed.name]
+            self._gone = self._gone.plus(removed, records, self._bag.messages_in(removed))
+        if self._gone is not before:
+            self._tell_ledger()
+        try:
+            flush()
+        except TraceError:
+            self._gone = before
+            self._tell_ledger()
+            raise
         self._note_flushed()
+        self._bag.delete_removed()
 
     def close(self) -> None:
         """Flush a last time, and close."""
@@ -339,6 +259,7 @@ class TraceBag:
         now_ns = self._last.realtime_ns if self._last is not None else time.time_ns()
         self._interruptions.append(Interruption(reason[:_LONGEST_REASON], now_ns))
         self._is_interrupted = True
+        self._records_in[self._bag.file_name] -= self._records_waiting
         self._lose_records(self._records_waiting)
         return lost
 
@@ -415,7 +336,7 @@ class TraceBag:
 
     def _is_time_to_split(self, now_ns: int) -> bool:
         age_s = (now_ns - (self._bag.file_start_ns or now_ns)) / 1e9
-        return 0 < self._split.after_s <= age_s or 0 < self._split.after_bytes <= self._bag.file_bytes
+        return 0 < self._split.after_s <= age_s or 0 < self._split.file_bytes <= self._bag.file_bytes
 
     def _write_batch(self, drain: Drain, records: bytes) -> None:
         batch = Batch(drain.monotonic_ns, drain.realtime_ns, drain.written, drain.dropped, records)

@@ -9,6 +9,7 @@ import numpy as np
 from mauve_rt.trace.format.records import DEADLINE_MISSED, Kind
 from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.decisions import ExplainedDecision, explained_decisions
+from mauve_rt.trace.reading.log_lines import LOG_TYPE, LogLine, log_lines
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration, reconfigurations
 from mauve_rt.trace.reading.statistics import ComponentStatistics, component_statistics
 from mauve_rt.trace.reading.trace import Trace
@@ -68,6 +69,8 @@ class Analysis:
     """Marked as such: what runs marks overruns."""
     violations: list[Violation] = field(default_factory=list)
     """Jobs above their bound, by time."""
+    log: list[LogLine] = field(default_factory=list)
+    """What components wrote, by time."""
 
     @property
     def duration_ns(self) -> int:
@@ -128,6 +131,7 @@ def analyse(
         decisions=explained_decisions(trace),
         misses=_misses(trace),
         violations=violations(trace.messages(VIOLATION_TYPE), trace.components),
+        log=log_lines(trace.messages(LOG_TYPE), trace.components),
     )
 
 

@@ -5,7 +5,7 @@ from html import escape
 from mauve_rt.trace.reading.architecture import ComponentInfo
 from mauve_rt.trace.reading.reconfigurations import Reconfiguration
 from mauve_rt.trace.reading.statistics import Distribution
-from mauve_rt.trace.recording.trace_bag import Entry
+from mauve_rt.trace.recording.ledger import Entry
 from mauve_rt.trace.report.analysis import Analysis, Swap
 from mauve_rt.trace.report.blocks import Cell, Section, details, table
 from mauve_rt.trace.report.units import share_text, time_text
@@ -101,7 +101,8 @@ def losses_section(analysis: Analysis) -> Section:
         (name, loss.written, loss.received, Cell(f"{loss.lost:,}", "attention" if loss.lost else ""))
         for name, loss in analysis.trace.losses.items()
     ]
-    html = table(("component", "records written", "in the bag", "lost"), rows)
+    html = "".join(f"<p>{escape(_sentence(one.text))}</p>" for one in analysis.trace.deleted)
+    html += table(("component", "records written", "in the bag", "lost"), rows)
     if others := [
         _topic_row(*item) for item in analysis.trace.ledger.items() if item[1].numbered is not None
     ]:
@@ -113,6 +114,10 @@ def losses_section(analysis: Analysis) -> Section:
     if files:
         html += details("Files", table(("file", "written by", "bytes read", "state"), files))
     return Section("What is in the trace", html, anchor="losses")
+
+
+def _sentence(text: str) -> str:
+    return f"{text[0].upper()}{text[1:]}."
 
 
 def _topic_row(topic: str, entry: Entry) -> tuple[object, ...]:

@@ -11,7 +11,7 @@ from mauve_rt.trace.report.columns import Columns
 from mauve_rt.trace.report.cycles import Array, Times
 from mauve_rt.trace.report.decisions import decision_flags, decision_places
 from mauve_rt.trace.report.detail import BUDGET, Detail, choose_detail
-from mauve_rt.trace.report.markers import VIOLATION, Markers, markers_of
+from mauve_rt.trace.report.markers import LOG, VIOLATION, WARNING, Markers, Text, markers_of, numbered
 from mauve_rt.trace.report.values import values_data
 
 _WORST = 20
@@ -23,7 +23,8 @@ _SHOWN_SWAPS = 5_000
 def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str, Any], str]:
     """Return the timeline's description (JSON) and its columns (base64)."""
     components = analysis.trace.components
-    markers = {component: _markers(analysis, component) for component in components}
+    log, texts = numbered(analysis.log, len(analysis.trace.names))
+    markers = {component: _markers(analysis, component, log) for component in components}
     tracks = [track for name in components for track in analysis.slices[name].values()]
     tracks += [analysis.releases[name] for name in components]
     instants_ns = interesting_instants(analysis, markers)
@@ -33,7 +34,7 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
     described = {
         "begin": analysis.begin_ns - analysis.zero_ns,
         "duration": analysis.duration_ns,
-        "names": list(analysis.trace.names),
+        "names": [*analysis.trace.names, *texts],
         "rows": rows,
         "swaps": _swaps(analysis)[:_SHOWN_SWAPS],
         "decisions": decision_flags(analysis),
@@ -46,9 +47,10 @@ def timeline_data(analysis: Analysis, *, budget: int = BUDGET) -> tuple[dict[str
     return described, columns.data()
 
 
-def _markers(analysis: Analysis, component: str) -> list[Markers]:
+def _markers(analysis: Analysis, component: str, log: list[Text]) -> list[Markers]:
     above = (one for one in analysis.violations if one.component == component)
-    return markers_of(analysis.trace.of(component), above)
+    written = [one for one in log if one.line.component == component]
+    return markers_of(analysis.trace.of(component), above, written)
 
 
 def interesting_instants(analysis: Analysis, markers: dict[str, list[Markers]]) -> Times:
@@ -61,7 +63,7 @@ def interesting_instants(analysis: Analysis, markers: dict[str, list[Markers]]) 
         for kind, entries in kinds:
             if kind in ("overrun", VIOLATION):
                 found.append(_worst(entries, "value", _JUMPS)["time_ns"])
-            elif kind != "mark":
+            elif kind not in ("mark", LOG):
                 found.append(entries["time_ns"][:_JUMPS])
         releases = analysis.releases[component]
         for measure in ("wakeup_ns", "response_ns"):
@@ -165,7 +167,7 @@ def swap_title(what: str, to_core: str = "") -> str:
 def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, list[list[int]]]:
     """Places to go to, [row, time, length], by kind and in the order of time."""
     found: dict[str, list[list[int]]] = {
-        kind: [] for kind in ("swap", "overrun", "fault", VIOLATION, "wakeup", "response")
+        kind: [] for kind in ("swap", "overrun", "fault", VIOLATION, WARNING, "wakeup", "response")
     }
     found["decision"] = decision_places(analysis)
     found["swap"] = [
@@ -175,7 +177,7 @@ def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, l
         for kind, entries in markers[component]:
             if kind in found:
                 worst = _worst(entries, "value", _JUMPS)
-                late = worst["value"]
+                late = worst["value"] if kind != WARNING else np.zeros_like(worst["value"])
                 found[kind] += _places(row, worst["time_ns"] - late - analysis.begin_ns, late)
     for kind in ("wakeup", "response"):
         found[kind] = _worst_releases(analysis, f"{kind}_ns")
@@ -184,7 +186,7 @@ def _jumps(analysis: Analysis, markers: dict[str, list[Markers]]) -> dict[str, l
         [rows[one.component], one.time_ns - analysis.begin_ns, one.late_ns]
         for one in analysis.misses[:_JUMPS]
     ]
-    for kind in ("swap", "overrun", "fault", VIOLATION):
+    for kind in ("swap", "overrun", "fault", VIOLATION, WARNING):
         found[kind].sort(key=lambda place: place[1])
     return found
 

@@ -14,6 +14,7 @@ _JUMPS = (
     ("overrun", "Overruns"),
     ("violation", "Above their bound"),
     ("fault", "Faults"),
+    ("warning", "Warnings in the log"),
     ("wakeup", "Worst wake-ups"),
     ("response", "Worst responses"),
 )
@@ -40,6 +41,9 @@ def timeline_section(analysis: Analysis, described: dict[str, Any]) -> Section:
     rules = '<div class="rules-name"><b>rules</b></div>' if described["decisions"] else ""
     shown = [*_KEYS, *([("decision", "decision of a rule")] if rules else [])]
     shown += [("violation", "job above its bound")] if described["jumps"]["violation"] else []
+    kinds = {one["kind"] for row in described["rows"] for one in row["markers"]}
+    shown += [("log", "log line")] if "log" in kinds else []
+    shown += [("warning", "warning or error in the log")] if "warning" in kinds else []
     shown += [("kept", "kept in full")] if described["bucket"] else []
     keys = "".join(f'<span><i class="key-{kind}"></i>{name}</span>' for kind, name in shown)
     html = (

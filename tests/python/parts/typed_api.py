@@ -7,6 +7,7 @@ hides nothing.
 from collections.abc import Callable
 from typing import assert_type
 
+from mauve_msgs.srv import LookupTransform
 from mauve_rt.api import (
     FOREVER,
     NOT_MEASURED,
@@ -31,6 +32,7 @@ from mauve_rt.api import (
     Property,
     ReadPort,
     RealtimeStatus,
+    RequestPort,
     Resource,
     RingBuffer,
     Sample,
@@ -43,6 +45,9 @@ from mauve_rt.api import (
     TraceDrain,
     Transaction,
     TransactionReport,
+    TransformBuffer,
+    TransformLookup,
+    TransformTree,
     WritePort,
     call_port,
     event_port,
@@ -53,6 +58,7 @@ from mauve_rt.api import (
     property,  # noqa: A004
     read_port,
     read_resource,
+    request_port,
     s_to_ns,
     service,
     times,
@@ -89,6 +95,7 @@ class HoverShell(Shell):
     target = write_port(Pose, on_commit="hold", on_stop="set_zero")
     get = call_port(Map.get)
     visit = call_port("package/Visitor")
+    look = request_port(LookupTransform)
     reached = event_port()
     height = property(1.0, unit="m", description="above ground", minimum=0.0, maximum=9.0)
     tries = property(3)
@@ -121,6 +128,8 @@ class HoverCore(Core[HoverShell]):
             assert_type(self.shell.target.write(sample.value), bool)
         assert_type(self.shell.get(3, default=1.0), float)
         self.shell.visit(print)
+        assert_type(self.shell.look, RequestPort)
+        self.shell.look(LookupTransform.Request(target="map", source="base"))
         self.shell.reached.raise_()
         self.shell.target.write(3)  # type: ignore[arg-type]
         self.shell.get("three")  # type: ignore[arg-type]
@@ -158,6 +167,14 @@ class NativeCore(Core):
 
     def tick(self) -> None:
         self.shell.beat.write(None)
+
+
+def look_up(buffer: TransformBuffer) -> list[float]:
+    buffer.set("map", "base", [1.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0], time_ns=1)
+    found = buffer.lookup("map", "base")
+    assert_type(found, TransformLookup)
+    assert_type(found.outcome, str)
+    return found.translation
 
 
 def members(shell: HoverShell) -> tuple[WritePort[Pose], CallPort[[int], float], EventPort]:
@@ -245,6 +262,7 @@ def run(registry: PluginRegistry) -> StepReport:
         "queue": RingBuffer(Pose, 8, overwrite=True, max_bytes=100),
         "latest": LatestValue("geometry_msgs/msg/Pose2D", max_readers=2),
         "count": EventCounter(),
+        "frames": TransformTree(frames=8, history=10),
         "map": Map(),
     }
     for name, resource in resources.items():

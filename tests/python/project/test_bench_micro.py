@@ -67,6 +67,14 @@ def test_the_limit_of_a_latest_values_write_comes_from_the_same_run(monkeypatch:
     assert (first.target, first.verdict) == ("<= 8 ns", "missed")
 
 
+def test_a_lookup_has_a_limit_for_each_hop(monkeypatch: pytest.MonkeyPatch):
+    found = {f"{side}_{hops}_ps": [1_500_000] for side in ("lookup", "map") for hops in (1, 10)}
+    _with(monkeypatch, found | {"failed": 0}, {0})
+    rows = list(micro.transform_lookup_rows(QUICK))
+    assert [row.verdict for row in rows] == ["missed", "met", "met"]
+    assert [row.ratio for row in rows] == [1, 1, None]
+
+
 def test_a_shadow_costs_what_it_adds(monkeypatch: pytest.MonkeyPatch):
     calls = {"read": 2, "write": 10, "tapped_read": 14, "tapped_write": 20, "watched_write": 21, "capture": 7}
     times_us = {"plain": 8, "shadowed": 11, "waking": 12, "probation": 9}

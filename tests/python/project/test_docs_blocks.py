@@ -25,6 +25,7 @@ HOWTO_ROS = "ros/executor/test_howto_pages.py::test_"
 REPAIRED = f"{HOWTO_ROS}a_faulted_component_is_repaired_as_the_page_says"
 ADDED = f"{HOWTO_ROS}a_component_is_removed_and_added_as_the_page_says"
 GIVEN_UP = f"{HOWTO_ROS}a_hung_component_is_given_up_as_the_page_says"
+PART_LOG = "ros/executor/test_part_log.py::test_"
 PEERS = f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same"
 UNIT_FILES = f"{HOWTO}systemd_knows_each_line_of_the_units"
 SNAPSHOT = "python/trace/test_snapshot.py::test_every_reader_reads_a_snapshot_of_a_bag_that_is_being_written"
@@ -143,6 +144,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "wakeup_max_us: {warn: 300": (PINNED,),
     },
     "docs/howto/record_and_report.md": {
+        "mauve record start /executor all": (
+            "ros/executor/test_recording.py::test_topics_by_pattern_are_recorded_also_those_that_appear_later",
+        ),
         "mauve record start /executor images": (
             "ros/bridge/test_topic_receiver.py::test_messages_of_4_mb_are_received_or_counted",
         ),
@@ -177,6 +181,16 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "anew.yaml --dry-run": (ADDED,),
         "guidance --force": (GIVEN_UP,),
         "is stopped by force": (GIVEN_UP,),
+    },
+    "docs/howto/log_lines.md": {
+        "[WARN] [1796050000.250104]": (f"{PART_LOG}a_line_is_on_rosout_the_console_and_in_the_bag",),
+        "guidance: {..., log_level:": (f"{README}the_pieces_of_architecture_files_are_accepted",),
+        "mauve log-level /robot_1/executor guidance debug": (
+            f"{PART_LOG}levels_are_set_by_mauve_and_by_the_services_of_ros",
+        ),
+        "ros2 service call /robot_1/executor/set_logger_levels": (
+            f"{PART_LOG}levels_are_set_by_mauve_and_by_the_services_of_ros",
+        ),
     },
     "docs/howto/see_values.md": {
         "mauve echo /robot_1/executor pose   ": (

@@ -37,6 +37,7 @@ MODULES = {
     "rich": ("python3-rich", "rich"),
     "rosbags": ("", "rosbags"),
     "ruamel": ("python3-ruamel.yaml", "ruamel.yaml"),
+    "scipy": ("python3-scipy", "scipy"),
     "yaml": ("python3-yaml", "PyYAML"),
     "zstandard": ("", "mcap"),  # comes with it
 }

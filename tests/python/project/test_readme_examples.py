@@ -94,6 +94,10 @@ def test_the_pieces_of_architecture_files_are_accepted(tmp_path: Path) -> None:
     enforced = _indented("control: {..., enforce_wcet").replace("...", "shell: a/A, core: a/A, fsm: a/A")
     file.write_text(f"mauve: 1\ncomponents:\n  {enforced}", encoding="utf-8")
     assert load_architecture(file).components["control"].enforce_wcet
+    logging = _fenced("yaml", "guidance: {..., log_level").replace("...", "shell: a/A, core: a/A, fsm: a/A")
+    file.write_text(f"mauve: 1\n{logging}", encoding="utf-8")
+    assert load_architecture(file).components["guidance"].log_level == "debug"
+    assert load_architecture(file).resources["scan"].log_level == "warn"
     sender = re.search(r"`(executor: {sender: .*?}})`", README, re.DOTALL)
     assert sender is not None
     file.write_text(f"{COMPONENTS}{' '.join(sender[1].split())}\n", encoding="utf-8")
@@ -111,7 +115,7 @@ def test_service_calls_have_fields_of_their_services() -> None:
     for _, _, _, service, type_name, fields in calls:
         package, kind, name = type_name.split("/")
         known = getattr(importlib.import_module(f"{package}.{kind}"), name).Request
-        given = re.findall(r"(\w+):", fields)
+        given = re.findall(r"(\w+):", re.sub(r"\[.*\]", "", fields))
         assert set(given) <= set(known.get_fields_and_field_types()), service
 
 

@@ -27,9 +27,10 @@ from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry
 from mauve_rt.trace.recording.recorder import Recorder
+from mauve_rt.trace.recording.sources import TopicSource
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-from mauve_rt.trace.recording.trace_bag import DROPPED_MESSAGES, INTERRUPTIONS, LEDGER, Entry, TopicSource
 
 
 @pytest.fixture(autouse=True)

@@ -18,9 +18,10 @@ from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
+from mauve_rt.trace.recording.ledger import LEDGER, Entry
 from mauve_rt.trace.recording.recorder import DROPPED_MESSAGES, Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-from mauve_rt.trace.recording.trace_bag import LEDGER, Entry, TraceBag
+from mauve_rt.trace.recording.trace_bag import TraceBag
 
 NODE = "/robot_1/executor"
 TEXT = "mauve_test_msgs/msg/Text"

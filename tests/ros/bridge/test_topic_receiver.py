@@ -104,6 +104,34 @@ def test_messages_of_4_mb_are_received_or_counted(graph: Any, make: Make, reliab
         assert taken.counts == (30, 0, 0)
 
 
+def test_a_topic_may_come_later(graph: Any, make: Make) -> None:
+    receiver = make([("/first", NUMBER, RELIABLE, 100)])
+    first = graph.voice(UInt64, "/first", QoSProfile(depth=1000, reliability=RELIABLE))
+    second = graph.node.create_publisher(UInt64, "/second", QoSProfile(depth=1000, reliability=RELIABLE))
+    graph.spin_until(lambda: first.get_subscription_count() == 1, "the first subscription")
+    first.publish(UInt64(data=0))  # waits in the queue, or in the middleware
+    qos = native_qos(QoSProfile(depth=100, reliability=RELIABLE))
+    assert receiver.subscribe("/second", NUMBER, qos) == 1
+    graph.spin_until(lambda: second.get_subscription_count() == 1, "the second subscription")
+    first.publish(UInt64(data=1))
+    second.publish(UInt64(data=7))
+    found: dict[int, list[int]] = {0: [], 1: []}
+
+    def take() -> bool:
+        batch = receiver.take()
+        for number, size in enumerate(batch.sizes):
+            found[number] += [small(data) for _, data in batch.messages(number)][:size]
+        return found == {0: [0, 1], 1: [7]}
+
+    graph.spin_until(take, "all messages")
+    assert receiver.take().counts == [(2, 0, 0), (1, 0, 0)]
+    with pytest.raises(MauveError):
+        receiver.subscribe("/third", "no_such/msg/Type", qos)
+    second.publish(UInt64(data=8))
+    found[1].clear()
+    graph.spin_until(lambda: take() or found[1] == [8], "a message after a refusal")
+
+
 def test_messages_that_the_middleware_overwrites_are_lost_before(graph: Any, make: Make) -> None:
     receiver = make([("/burst", NUMBER, RELIABLE, 1)])
     voice = graph.voice(UInt64, "/burst", QoSProfile(depth=1000, reliability=RELIABLE))

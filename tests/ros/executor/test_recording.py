@@ -27,7 +27,7 @@ from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
 from mauve_rt.trace.reading.statistics import component_statistics
-from mauve_rt.trace.recording.trace_bag import LEDGER, ledger_of
+from mauve_rt.trace.recording.ledger import LEDGER, ledger_of
 
 EXECUTOR = "/robot_1/executor"
 Starter = Callable[..., ExecutorProcess]
@@ -122,6 +122,46 @@ def test_a_keeper_writes_the_bag(executor: ExecutorProcess, graph: Any, tmp_path
     assert "tear the bag" not in executor.output, "it never fell back on its own writes"
 
 
+def test_a_bag_of_limited_size_keeps_the_newest_files(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    bag = tmp_path / "bag"
+    settings = ("bag_split_bytes:=20000", "bag_max_size_bytes:=60000", f"bag:={bag}")
+    arguments = [word for setting in settings for word in ("-p", setting)]
+    executor = start_executor("-p", f"architecture:={architecture}", *arguments)
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    newest = lambda: max((int(file.stem.split("_")[1]) for file in bag.glob("*.mcap")), default=0)  # noqa: E731
+    graph.spin_until(lambda: newest() > 5 and not (bag / "bag_0.mcap").exists(), "deletions")
+    executor.end(signal.SIGTERM)
+    (deleted,) = mauve_rt.trace.open(bag).deleted
+    assert deleted.files > 2
+    assert deleted.records > 0
+    assert not [finding for finding in check_bag(bag) if finding.kind != "note"]
+    assert_rosbag2_reads(bag)
+
+
+def test_a_bag_is_compressed_on_request(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    assert start(graph, bag="bag", compression="zstd").success
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 20, "counts")
+    assert stop(graph).success
+    assert_rosbag2_reads(tmp_path / "bag")
+    with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
+        assert "zstd" in {chunk.compression for chunk in make_reader(stream).get_summary().chunk_indexes}
+    assert check_bag(tmp_path / "bag") == []
+
+
+def test_limits_that_do_not_fit_are_refused(architecture: Path, start_executor: Starter, tmp_path: Path):
+    settings = ("bag_split_bytes:=20000", "bag_max_size_bytes:=30000", f"bag:={tmp_path / 'bag'}")
+    arguments = [word for setting in settings for word in ("-p", setting)]
+    executor = start_executor("-p", f"architecture:={architecture}", *arguments)
+    executor.await_output(
+        "parameter bag_max_size_bytes: expected at least twice the size of a file, 40,000 bytes"
+    )
+    assert not (tmp_path / "bag").exists()
+
+
 def test_one_bag_after_the_other(executor: ExecutorProcess, graph: Any):
     bags = []
     for _ in range(2):
@@ -167,9 +207,24 @@ REFUSED = [
     ),
     ({"topics": ["a b"]}, "INVALID", "'a b'"),
     ({"topics": [""]}, "INVALID", "expected a name, found ''"),
+    ({"topics": ["camera/*"]}, "INVALID", "expected /NAME, /NAME:package/msg/Type of an installed message"),
+    ({"topics": ["/camera/*:std_msgs/msg/Imgae"]}, "INVALID", "found '/camera/*:std_msgs/msg/Imgae'"),
+    ({"topics": ["/camera/*:std_msgs/msg/Float64:wrong"]}, "INVALID", "pattern of topics to record"),
+    (
+        {"topic_regexes": ["("]},
+        "INVALID",
+        "expected a regular expression, found '(': missing ), unterminated subpattern at position 0",
+    ),
     ({"split_s": 0.1}, "INVALID", "bad split_s: expected 0 (the default) or 1 to 1e+06 s, found 0.1"),
     ({"split_s": float("nan")}, "INVALID", "bad split_s"),
     ({"split_bytes": 5}, "INVALID", "bad split_bytes"),
+    ({"compression": "lz4"}, "INVALID", "bad compression: expected none or zstd, found 'lz4'"),
+    ({"max_size_bytes": 399_999}, "INVALID", "bad max_size_bytes: expected 0 (no limit) or at least 400,000"),
+    (
+        {"split_bytes": 200_000, "max_size_bytes": 399_999},
+        "INVALID",
+        "expected at least twice the size of a file, 400,000 bytes, found 399,999",
+    ),
     ({"expected_revision": 1000}, "WRONG_REVISION", "expected 1000"),
 ]
 
@@ -360,7 +415,7 @@ def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tm
     assert (note.kind, note.text.partition(":")[0]) == ("note", "/robot_1/talk"), "nothing of the executor"
     assert "no gap between the first and the last message of each writer" in note.text
     ledger = json.loads(examine_bag(tmp_path / "bag").custom_data[LEDGER])
-    others = {"lost_before": 0, "numbered": True}
+    others = {"lost_before": 0, "numbered": True, "deleted": 0}
     assert ledger["/robot_1/talk"] == {"received": 20, "lost": 0, "repeated": 0, **others}
     assert ledger["/robot_1/count"]["numbered"] is None
     with (tmp_path / "bag" / "bag_0.mcap").open("rb") as stream:
@@ -465,6 +520,55 @@ def test_messages_lost_before_the_recorder_are_reported_everywhere(
     assert "of other nodes were lost before they came here" in stop(graph).message
     losses = [finding.text for finding in check_bag(tmp_path / "bag") if finding.is_loss]
     assert any(text.startswith("topic /burst: ") and "lost before the recorder" in text for text in losses)
+
+
+@pytest.mark.parametrize("fields", [{"topics": ["/camera/*"]}, {"topic_regexes": ["^/camera/"]}])
+def test_topics_by_pattern_are_recorded_also_those_that_appear_later(
+    executor: ExecutorProcess, graph: Any, tmp_path: Path, fields: dict[str, list[str]]
+) -> None:
+    graph.node.create_publisher(UInt64, "/elsewhere", 10)
+    left = graph.node.create_publisher(UInt64, "/camera/left", 100)
+    reply = start(graph, bag="bag", **fields)
+    assert reply.success, reply.message
+    told: list[Any] = graph.hear(DiagnosticArray, "/diagnostics")
+
+    def received(topic: str) -> int:
+        key = f"received[{topic}]"
+        all_values = [value for array in told for one in array.status for value in one.values]
+        return max((int(value.value) for value in all_values if value.key == key), default=0)
+
+    def is_received(voice: Any, topic: str) -> bool:
+        voice.publish(UInt64(data=1))
+        return received(topic) > 2
+
+    graph.spin_until(lambda: is_received(left, "/camera/left"), "a topic that was there")
+    right = graph.node.create_publisher(UInt64, "/camera/right/raw", 100)
+    graph.spin_until(lambda: is_received(right, "/camera/right/raw"), "a topic that appeared later")
+    before = received("/camera/left")
+    graph.spin_until(lambda: is_received(left, "/camera/left") and received("/camera/left") > before, "both")
+    assert stop(graph).success
+    topics = topics_of(tmp_path / "bag")
+    assert topics["/camera/left"] > 2
+    assert topics["/camera/right/raw"] > 2
+    assert "/elsewhere" not in topics
+    assert {finding.kind for finding in check_bag(tmp_path / "bag")} == {"note"}
+    ledger = ledger_of(examine_bag(tmp_path / "bag").custom_data)
+    assert ledger["/camera/right/raw"].received == topics["/camera/right/raw"]
+
+
+def test_a_pattern_takes_nothing_twice(executor: ExecutorProcess, graph: Any, tmp_path: Path) -> None:
+    assert start(graph, bag="bag", topics=["/*"], topic_regexes=["."]).success
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 20, "counts")
+    assert stop(graph).success
+    trace = mauve_rt.trace.open(tmp_path / "bag")
+    numbers = [message.msg.data for message in trace.messages("/robot_1/count")]
+    assert len(numbers) == len(set(numbers)) > 10
+    ledger = ledger_of(examine_bag(tmp_path / "bag").custom_data)
+    others = {topic for topic, entry in ledger.items() if entry.numbered is not None}
+    assert "/robot_1/count" not in others
+    assert not [topic for topic in others if topic.startswith((f"{EXECUTOR}/state", f"{EXECUTOR}/trace"))]
+    assert not [finding for finding in check_bag(tmp_path / "bag") if finding.kind != "note"]
 
 
 def test_another_type_on_a_topic_to_record_is_told(executor: ExecutorProcess, graph: Any):

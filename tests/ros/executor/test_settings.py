@@ -26,7 +26,16 @@ from mauve_rt.node.supervisor.settings import PARAMETERS as OF_SUPERVISOR
 
 NODE = "/robot_1/executor"
 FIXED = sorted(name for name, setting in PARAMETERS.items() if setting.is_fixed)
-CHANGEABLE = ["bag", "bag_split_bytes", "bag_split_s", "record_topics", "rules"]
+CHANGEABLE = [
+    "bag",
+    "bag_compression",
+    "bag_max_size_bytes",
+    "bag_split_bytes",
+    "bag_split_s",
+    "record_topic_regexes",
+    "record_topics",
+    "rules",
+]
 OTHER_VALUES = {bool: False, int: 1, float: 0.5, str: "elsewhere", list: ["elsewhere"]}
 PARTS = "{shell: executor_tests/TwinShell, core: executor_tests/Twin, fsm: executor_tests/TwinFsm}"
 RULES = """\

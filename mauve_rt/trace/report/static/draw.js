@@ -195,6 +195,14 @@
     overrun(context, x, y) {
       polygon(context, [[x - 4.5, y - 4], [x + 4.5, y - 4], [x, y + 4.5]]);
     },
+    log(context, x, y) {
+      context.fillRect(x - 3.5, y - 2.5, 7, 1.5);
+      context.fillRect(x - 3.5, y + 1, 5, 1.5);
+    },
+    warning(context, x, y) {
+      context.fillRect(x - 3.5, y - 2.5, 7, 2);
+      context.fillRect(x - 3.5, y + 1, 7, 2);
+    },
     violation(context, x, y) {
       polygon(context, [[x - 4.5, y + 4], [x + 4.5, y + 4], [x, y - 4.5]]);
     },
@@ -202,7 +210,7 @@
       polygon(context, [[x, y - 6], [x + 6, y], [x, y + 6], [x - 6, y]]);
     },
   };
-  const ORDER = ["mark", "start", "stop", "violation", "overrun", "fault"];
+  const ORDER = ["log", "mark", "warning", "start", "stop", "violation", "overrun", "fault"];
   const SERIOUS = ["violation", "overrun", "fault"];
 
   function polygon(context, points) {
@@ -212,7 +220,9 @@
   }
 
   mauve.markerColour = (kind, colours) =>
-    SERIOUS.includes(kind) ? colours.bad : { mark: colours.accent, start: colours.good, stop: colours.ink }[kind];
+    SERIOUS.includes(kind)
+      ? colours.bad
+      : { mark: colours.accent, start: colours.good, stop: colours.ink, log: colours.muted, warning: colours.attention }[kind];
 
   function drawMarkers(context, row, scale, top, bottom, colours) {
     const sorted = [...row.markers].sort((a, b) => ORDER.indexOf(a.kind) - ORDER.indexOf(b.kind));

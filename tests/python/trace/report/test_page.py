@@ -25,9 +25,9 @@ from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.reading.architecture import ComponentInfo, PortInfo
 from mauve_rt.trace.reading.facts import Message
 from mauve_rt.trace.reading.trace import Trace, merge_traces
+from mauve_rt.trace.recording.ledger import Entry
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
-from mauve_rt.trace.recording.trace_bag import Entry
 from mauve_rt.trace.report import Card, Section, Sentence, Verdict, judge, write_report
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.bags import bag_names

@@ -223,6 +223,12 @@ class Architecture final : public Configurable {
     deployment_epoch_ns_.store(epoch_ns, std::memory_order_relaxed);
   }
 
+  /// The log lines of its parts. [non-rt]
+  const std::shared_ptr<LogQueue>& log_queue() const noexcept { return log_queue_; }
+  /// The level from which on lines of the component, or of the resource, of that name are kept; of both where both have it.
+  /// [non-rt] Throws Error (unknown_component): neither is there.
+  void set_log_level(const std::string& name, LogLevel level);
+  LogLevel log_level(const std::string& name) const;
   /// Names by the numbers that trace records carry; those of removed components stay. [non-rt]
   std::vector<std::string> trace_components() const;
   /// Empties every ring, and what removed components left. [non-rt]
@@ -371,6 +377,8 @@ class Architecture final : public Configurable {
   void note_restructured() noexcept;
 
   PluginRegistry* registry_;
+  const std::shared_ptr<LogQueue> log_queue_{
+      std::make_shared<LogQueue>()};  // parts that are left behind have it, too
   ChangeLock change_lock_;
   mutable CommitGate commit_gate_;
   ArchitectureClaims claims_;

@@ -9,10 +9,12 @@
 #include "mauve_rt/data/latest_value.hpp"
 #include "mauve_rt/data/ring_buffer.hpp"
 #include "mauve_rt/data/shared_data.hpp"
+#include "mauve_rt/data/transform_tree.hpp"
 
 namespace mauve {
 
 /// Each has describe(), and make(): a template for those of a data type, or of a type of calls; else it gets the type.
-using GivenResources = std::tuple<SharedDataKind, RingBufferKind, LatestValueKind, EventKind, ClientKind>;
+using GivenResources =
+    std::tuple<SharedDataKind, RingBufferKind, LatestValueKind, EventKind, ClientKind, TransformTreeKind>;
 
 }  // namespace mauve

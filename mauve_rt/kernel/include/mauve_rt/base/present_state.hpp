@@ -61,6 +61,11 @@ class PresentState {
     return std::nullopt;
   }
 
+  /// The name of the state alone, by the writer's own thread. [rt]
+  std::uint32_t name() const MAUVE_RT {
+    return static_cast<std::uint32_t>(what_.load(std::memory_order_relaxed));  // relaxed: its own write
+  }
+
  private:
   static constexpr time_ns_t kChanging = -1;
   static constexpr std::uint64_t kWait = std::uint64_t{1} << 32U;  // beside the name

@@ -3,13 +3,11 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "mauve_rt/base/contract.hpp"
-#include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/base/record_ring.hpp"
 #include "mauve_rt/base/time.hpp"
 
 namespace mauve {
@@ -66,19 +64,12 @@ namespace detail {
 extern constinit thread_local TraceRing* this_threads_ring [[gnu::tls_model("initial-exec")]];
 }  // namespace detail
 
-/// Single producer (the component's thread), single consumer (who drains). wait-free on the producer's side.
-///
-/// | member    | written by | order                                                               |
-/// | --------- | ---------- | ------------------------------------------------------------------- |
-/// | head_     | producer   | release: publishes the record written before; the drain acquires    |
-/// | seen_tail_| producer   | its own: the tail as it last looked                                 |
-/// | dropped_  | producer   | relaxed: a count; its reader takes whatever is newest               |
-/// | tail_     | consumer   | release: frees the place only after the copy; the producer acquires |
-/// | the rest  | [setup]    | -                                                                   |
+/// The trace of one component, written by its thread; wait-free there.
 class TraceRing {
  public:
-  /// Capacity is rounded up to a power of two; all pages are touched. [setup]
-  explicit TraceRing(std::uint16_t component, std::size_t capacity = kDefaultCapacity);
+  /// As of RecordRing. [setup]
+  explicit TraceRing(std::uint16_t component, std::size_t capacity = kDefaultCapacity)
+      : ring_(capacity), component_(component) {}
   /// Stamps by this clock instead of the monotonic one: simulated time. [setup]
   void set_clock(const Clock* clock) noexcept { clock_ = clock; }
   /// Numbers its records from here on: an earlier ring of the same component has written so many. [setup]
@@ -94,39 +85,26 @@ class TraceRing {
   }
   void push_at(time_ns_t time_ns, TraceKind kind, std::uint32_t name = 0, std::int64_t a = 0,
                std::int64_t b = 0, std::int64_t c = 0) MAUVE_RT {
-    const std::uint64_t head = head_.load(std::memory_order_relaxed);  // relaxed: only this thread writes it
-    const std::uint64_t dropped = dropped_.load(std::memory_order_relaxed);
-    MAUVE_AUDIT(head - seen_tail_ <= mask_ + 1);
-    if (head - seen_tail_ > mask_) [[unlikely]] {
-      seen_tail_ = tail_.load(std::memory_order_acquire);
-      if (head - seen_tail_ > mask_) {
-        dropped_.store(dropped + 1, std::memory_order_relaxed);
-        return;
-      }
-    }
-    places_[head & mask_] = {.sequence = first_ + head + dropped,
-                             .time_ns = time_ns,
-                             .a = a,
-                             .b = b,
-                             .c = c,
-                             .name = name,
-                             .kind = static_cast<std::uint16_t>(kind),
-                             .component = component_};
-    head_.store(head + 1, std::memory_order_release);
+    TraceRecord* const place = ring_.next_place();
+    if (place == nullptr) [[unlikely]]
+      return;
+    *place = {.sequence = first_ + ring_.offered(),
+              .time_ns = time_ns,
+              .a = a,
+              .b = b,
+              .c = c,
+              .name = name,
+              .kind = static_cast<std::uint16_t>(kind),
+              .component = component_};
+    ring_.publish();
   }
 
-  /// Fetches the places that come next to the processor of the producer. [rt]
-  void warm_up() const MAUVE_RT {
-    constexpr std::uint64_t kPlaces = 16;
-    const std::uint64_t head = head_.load(std::memory_order_relaxed);
-    for (std::uint64_t at = head; at < head + kPlaces; ++at) __builtin_prefetch(&places_[at & mask_], 1);
-  }
-
-  /// Appends all records to the vector and frees their places. [non-rt], one thread at a time.
-  void drain(std::vector<TraceRecord>& into);
-  /// Records offered to this ring so far, dropped ones among them; exact while the producer rests. [non-rt]
-  std::uint64_t offered() const noexcept { return head_.load(std::memory_order_relaxed) + dropped(); }
-  std::uint64_t dropped() const noexcept { return dropped_.load(std::memory_order_relaxed); }
+  /// As of RecordRing. [non-rt], one thread at a time.
+  void drain(std::vector<TraceRecord>& into) { ring_.drain(into); }
+  /// Likewise. [rt]
+  void warm_up() const MAUVE_RT { ring_.warm_up(); }
+  std::uint64_t offered() const MAUVE_RT { return ring_.offered(); }
+  std::uint64_t dropped() const MAUVE_RT { return ring_.dropped(); }
 
   /// The ring of the calling thread, or nullptr where it is no component's. [rt]
   static TraceRing* of_this_thread() MAUVE_RT { return MAUVE_RT_TRUSTED(detail::this_threads_ring); }
@@ -134,15 +112,10 @@ class TraceRing {
   static void set_for_this_thread(TraceRing* ring) noexcept { detail::this_threads_ring = ring; }
 
  private:
-  std::unique_ptr<TraceRecord[]> places_;
-  std::size_t mask_;
+  RecordRing<TraceRecord> ring_;
   std::uint16_t component_;
   std::uint64_t first_{0};
   const Clock* clock_{nullptr};  // nullptr: monotonic, without a virtual call
-  alignas(64) Atomic<std::uint64_t> head_{0};
-  std::uint64_t seen_tail_{0};
-  Atomic<std::uint64_t> dropped_{0};
-  alignas(64) Atomic<std::uint64_t> tail_{0};
 };
 
 /// Records an event of the user's own on the calling component's thread; nothing elsewhere. [rt]

@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "mauve_rt/base/configurable.hpp"
+#include "mauve_rt/base/log.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/base/trace.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/service.hpp"
 
@@ -114,6 +116,7 @@ enum class TopicBinding : std::uint8_t { none, publish, subscribe };
 /// | -------- | ---------------- | ----------------- | -------------------------------------------------------------- |
 /// | use_     | ordinary threads | the same          | use_mutex_                                                     |
 /// | stop_ns_ | begin_stop()     | who sends samples | relaxed: before the write, so who has the sample sees the time |
+/// | log_     | [setup]          | anyone            | its own: log.hpp                                               |
 /// | stops_   | end_stop()       | who sends samples | release/acquire: who sees the count finds the sample           |
 class Resource : public ConfigurablePart, public std::enable_shared_from_this<Resource> {
  public:
@@ -131,6 +134,13 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   /// Given by the architecture, once. [setup]
   virtual void set_name(const std::string& name) { name_ = name; }
   std::string description() const override { return "resource " + name_; }
+  /// Given by the architecture, once, with the name. [setup]
+  void set_log_queue(std::shared_ptr<LogQueue> queue) {
+    log_.set_up(std::move(queue), LogLine::kNoComponent, TraceNames::intern(name_));
+  }
+  /// [rt]
+  LogSource& log_source() MAUVE_RT { return log_; }
+  const LogSource& log_source() const MAUVE_RT { return log_; }
   /// The longest execution for which one user holds its lock; 0: not declared. [rt]
   time_ns_t longest_hold_ns() const MAUVE_RT { return longest_hold_ns_; }
   /// For the timing analysis: nothing enforces it. Before ports are connected. [setup]
@@ -138,7 +148,7 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   void set_longest_hold_ns(time_ns_t longest_hold_ns);
 
   /// Notified of writes and calls, for those who carry them outside; `of_stops`: of the writes of a stop, too. [setup]
-  void set_notifier(Notifier* notifier, Notifier* of_stops = nullptr) noexcept {
+  virtual void set_notifier(Notifier* notifier, Notifier* of_stops = nullptr) noexcept {
     notifier_ = notifier;
     stop_notifier_ = of_stops;
   }
@@ -228,10 +238,15 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   /// That number in the newest value; false when there is none yet. [rt]
   virtual bool read_number(const NumberPlace& /*place*/, double& /*number*/) MAUVE_RT { return false; }
 
+  /// Its values that are always valid, for a topic of their own; nullptr: there are none. It lives as long. [non-rt]
+  virtual Resource* static_side() noexcept { return nullptr; }
+
   /// What it is seen from those who carry its calls; nullptr: no client. [rt]
   virtual ClientBase* client() MAUVE_RT { return nullptr; }
 
  protected:
+  /// Lines of this resource, also those of its services on the threads of components. [rt]
+  Log log() const MAUVE_RT { return Log(&log_); }
   void offer(ServiceBase& service) {
     service.resource_ = this;
     services_.push_back(&service);
@@ -250,6 +265,7 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   std::string kind_;
   std::string type_;
   std::string name_;
+  LogSource log_;
   time_ns_t longest_hold_ns_{0};
   std::vector<ServiceBase*> services_;
   Notifier* notifier_{nullptr};

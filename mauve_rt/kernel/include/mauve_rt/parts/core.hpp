@@ -62,6 +62,8 @@ class CoreBase : public ComponentPart<CoreBase> {
   std::string description() const override { return "core " + implementation(); }
 
  protected:
+  /// Lines for the console, /rosout and the bag, of this component: log().warn("tracking error {} m", error). [rt]
+  Log log() const MAUVE_RT { return Log(context_ != nullptr ? &context_->log : nullptr); }
   /// The component's logical clock: the nominal instant it acts at. [rt]
   time_ns_t clock_ns() const MAUVE_RT {
     return context_ != nullptr ? context_->clock_ns.load(std::memory_order_relaxed) : monotonic_now_ns();

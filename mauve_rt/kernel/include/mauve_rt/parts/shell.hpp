@@ -8,6 +8,7 @@
 #include <typeinfo>
 #include <vector>
 
+#include "mauve_rt/base/context.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/port.hpp"
@@ -41,6 +42,9 @@ class Shell : public ComponentPart<Shell> {
   std::string description() const override { return "shell " + implementation(); }
 
  protected:
+  /// As of a core. [rt]
+  Log log() const MAUVE_RT { return Log(context_ != nullptr ? &context_->log : nullptr); }
+
   template <typename T>
   ReadPort<T>& read_port(std::string name) {
     return add(ports_, std::make_unique<ReadPort<T>>(std::move(name)));
@@ -99,6 +103,7 @@ class Shell : public ComponentPart<Shell> {
   }
   void check_new(const std::string& name) const;
 
+  const Context* context_{nullptr};
   std::vector<std::unique_ptr<PortBase>> ports_;
   std::vector<std::unique_ptr<PropertyBase>> properties_;
   std::size_t bytes_{0};

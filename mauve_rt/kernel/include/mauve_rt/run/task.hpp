@@ -110,6 +110,7 @@ struct ChangeSignal {
 /// | machine_               | machine                               | machine      | its own: machine.hpp               |
 /// | queue_place_ ...       | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
+/// | log_ring_              | ordinary threads, no thread of its own| its thread   | thread's creation                  |
 /// | command_mutex_ (PI)    | who starts, commits, ends the thread  | -            | -                                  |
 /// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
 class Task final : public Waiter {
@@ -130,7 +131,10 @@ class Task final : public Waiter {
   /// Machine::give_up_place_for(), when the place is not kept. [rt]
   void give_up_place_for(const State& initial) MAUVE_RT { machine_.give_up_place_for(initial); }
   /// [setup]
-  void set_settings(const TaskSettings& settings) { settings_ = settings; }
+  void set_settings(const TaskSettings& settings) {
+    settings_ = settings;
+    log_source().set_level(settings.log_level);
+  }
   /// [rt]
   const TaskSettings& settings() const MAUVE_RT { return settings_; }
   Context& context() MAUVE_RT { return machine_.context(); }
@@ -359,6 +363,15 @@ class Task final : public Waiter {
   const ThreadCounters& counters() const MAUVE_RT { return counters_; }
   /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
   TraceRing* ring() MAUVE_RT { return ring_.get(); }
+  /// The ring of its log lines; nullptr: nobody takes them. [rt]
+  LogRing* log_ring() MAUVE_RT { return log_ring_.get(); }
+  /// Where its log lines go. Once, before it has a thread. [setup]
+  void set_log_queue(std::shared_ptr<LogQueue> queue) noexcept {
+    machine_.context().log.set_up(std::move(queue), number_, 0);
+  }
+  /// [rt]
+  LogSource& log_source() MAUVE_RT { return machine_.context().log; }
+  const LogSource& log_source() const MAUVE_RT { return machine_.context().log; }
   /// How many records an earlier component of its number has written: its own are numbered from there. [setup]
   void set_first_record(std::uint64_t sequence) noexcept { first_record_ = sequence; }
   /// Appends the ring's records and adds its counts to those; leaves all alone when nothing is traced. [non-rt]
@@ -385,6 +398,7 @@ class Task final : public Waiter {
   void require_startable() const;
   bool can_take_up_start() const noexcept;
   void begin_trace(bool trace);
+  void begin_log();
 
   // the thread
   static void* thread_entry(void* self) noexcept;
@@ -460,6 +474,7 @@ class Task final : public Waiter {
   ThreadCounters counters_;
   Mutex ring_mutex_;
   std::unique_ptr<TraceRing> ring_;
+  std::shared_ptr<LogRing> log_ring_;
 
   Atomic<Shell*> shell_{nullptr};
   CoreBinding* core_{nullptr};

@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "mauve_rt/base/log.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/parts/declared_state.hpp"
 
@@ -37,7 +38,8 @@ struct TaskSettings {
   std::size_t trace_records{0};  // room in the trace's ring until it is drained; 0: by the period
   time_ns_t hung_after_ns{0};    // a state that lasts longer is told as hung; 0: 10 periods, 1 s at least
   time_ns_t deadline_ns{0};      // from a release to the next wait, for the analysis; 0: the next instant
-  bool enforce_wcet{false};      // wcet_ns of an execution state is a budget of CPU time; a fault above it
+  LogLevel log_level{LogLevel::info};  // its log lines below are not kept; what it begins with
+  bool enforce_wcet{false};  // wcet_ns of an execution state is a budget of CPU time; a fault above it
   std::vector<DeclaredState> states{};  // of the fsm's execution states
   bool operator==(const TaskSettings&) const = default;
 };
@@ -108,6 +110,14 @@ inline constexpr std::array kTaskSettings{
                                                  "leave the key out for 10 periods, 1 s at least"),
     number_setting<&TaskSettings::deadline_ns>("deadline_ns", 1, kLongest,
                                                "leave the key out for the next instant"),
+    TaskSetting{
+        .name = "log_level",
+        .choices = kLogLevels,
+        .get = [](const TaskSettings& all) -> SettingValue { return std::string(to_string(all.log_level)); },
+        .assign =
+            [](TaskSettings& all, const SettingValue& value) {
+              all.log_level = *find_log_level(std::get<std::string>(value));
+            }},
     TaskSetting{.name = "enforce_wcet",
                 .hint = "without it nothing enforces wcet_ns",
                 .get = [](const TaskSettings& all) -> SettingValue { return all.enforce_wcet; },
