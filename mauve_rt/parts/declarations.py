@@ -23,8 +23,17 @@ from mauve_rt.parts.ports import (
     WritePort,
 )
 from mauve_rt.parts.resources import service_type
+from mauve_rt.parts.transformed_ports import TransformedReadPort
 
-__all__ = ["call_port", "event_port", "property", "read_port", "request_port", "write_port"]
+__all__ = [
+    "call_port",
+    "event_port",
+    "property",
+    "read_port",
+    "request_port",
+    "transformed_read_port",
+    "write_port",
+]
 
 T = TypeVar("T")
 V = TypeVar("V", bound=bool | int | float | str)
@@ -55,6 +64,24 @@ def call_port(service: str) -> CallPort[..., Any]: ...
 def call_port(service: Callable[..., Any] | str) -> CallPort[..., Any]:
     """A port that calls a service of a resource in Python: the service's type, or the method that is one."""
     return CallPort(service if isinstance(service, str) else service_type(service))
+
+
+def transformed_read_port(
+    type: type[T] | str,  # noqa: A002
+    *,
+    to: str,
+    lookup: str,
+    source: str = "",
+    latest: bool = False,
+    optional: bool = False,
+) -> TransformedReadPort[T]:
+    """A port to read from whose values are in its own frame, `to`.
+
+    `lookup`: the name of the shell's `request_port(LookupTransform)`. `source`: the frame of values without a
+    header, or with an empty frame_id. `latest`: by the latest transform, in the place of that at the time at
+    which the value was written.
+    """
+    return TransformedReadPort(type, to=to, lookup=lookup, source=source, latest=latest, optional=optional)
 
 
 def request_port(service: Any) -> RequestPort:

@@ -39,6 +39,7 @@
 #include "mauve_rt/parts/fsm.hpp"
 #include "mauve_rt/parts/property.hpp"
 #include "mauve_rt/parts/shell.hpp"
+#include "mauve_rt/parts/transformed_read_port.hpp"
 #include "mauve_rt/run/change_lock.hpp"
 #include "mauve_rt/run/component.hpp"
 #include "mauve_rt/run/probation.hpp"
