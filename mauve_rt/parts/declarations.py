@@ -70,14 +70,14 @@ def transformed_read_port(
     type: type[T] | str,  # noqa: A002
     *,
     to: str,
-    lookup: str,
+    lookup: RequestPort,
     source: str = "",
     latest: bool = False,
     optional: bool = False,
 ) -> TransformedReadPort[T]:
     """A port to read from whose values are in its own frame, `to`.
 
-    `lookup`: the name of the shell's `request_port(LookupTransform)`. `source`: the frame of values without a
+    `lookup`: the shell's `request_port(LookupTransform)`. `source`: the frame of values without a
     header, or with an empty frame_id. `latest`: by the latest transform, in the place of that at the time at
     which the value was written.
     """

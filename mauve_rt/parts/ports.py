@@ -191,7 +191,7 @@ class RequestPort(Member):
     def __init__(self, service: Any) -> None:
         super().__init__()
         self.type = messages.service_name(service)
-        self._service = service
+        self.service = service
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
@@ -204,10 +204,10 @@ class RequestPort(Member):
             MauveError: not connected, or not answered.
             TypeError: a request of another type.
         """
-        if not isinstance(request, self._service.Request):
+        if not isinstance(request, self.service.Request):
             raise TypeError(f"port '{self.name}': expected {self.type}.Request, found {request!r}")
         data = self._shell.request(self.name, messages.serialize(request))
-        return messages.deserialize(data, self._service.Response)
+        return messages.deserialize(data, self.service.Response)
 
 
 class EventPort(Member):

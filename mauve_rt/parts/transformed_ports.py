@@ -5,9 +5,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
 
-from mauve_rt._kernel import TRANSFORM_OUTCOMES, RigidTransform, ShellView
+from mauve_rt._kernel import TRANSFORM_OUTCOMES, RigidTransform
 from mauve_rt.parts import messages
-from mauve_rt.parts.ports import ReadPort, Sample
+from mauve_rt.parts.ports import ReadPort, RequestPort, Sample
 
 __all__ = ["TransformedReadPort", "TransformedSample"]
 
@@ -35,20 +35,13 @@ class TransformedReadPort(ReadPort[T]):
         type: type[T] | str,  # noqa: A002
         *,
         to: str,
-        lookup: str,
+        lookup: RequestPort,
         source: str = "",
         latest: bool = False,
         optional: bool = False,
     ) -> None:
         super().__init__(type, optional=optional)
         self._to, self._lookup, self._source, self._latest = to, lookup, source, latest
-
-    def bind(self, view: ShellView) -> None:
-        """Take the component's shell."""
-        from mauve_msgs.srv import LookupTransform  # noqa: PLC0415 - only who has such a port loads it
-
-        super().bind(view)
-        self._service: Any = LookupTransform
 
     def read(self) -> TransformedSample[T]:
         """The present value in the port's frame, by the transform at the time at which it was written.
@@ -63,9 +56,9 @@ class TransformedReadPort(ReadPort[T]):
         if sample.status == "none" or source == self._to:
             return TransformedSample(sample.value, sample.status, sample.time_ns)
         time_ns = 0 if self._latest else sample.time_ns
-        request = self._service.Request(target=self._to, source=source, time_ns=time_ns)
-        data = self._shell.request(self._lookup, messages.serialize(request))
-        found = messages.deserialize(data, self._service.Response)
+        request = self._lookup.service.Request(target=self._to, source=source, time_ns=time_ns)
+        data = self._shell.request(self._lookup.name, messages.serialize(request))
+        found = messages.deserialize(data, self._lookup.service.Response)
         outcome = TRANSFORM_OUTCOMES[found.outcome]
         if outcome != _DONE:
             none = self.message_class()
@@ -84,7 +77,7 @@ def transformed(by: Any, value: T) -> T:
     """
     p, q = by.translation, by.rotation
     moved = copy.deepcopy(value)
-    _move(RigidTransform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w)), moved)
+    _move(RigidTransform([p.x, p.y, p.z], [q.x, q.y, q.z, q.w]), moved)
     return moved
 
 
@@ -114,8 +107,8 @@ def _move_place(by: RigidTransform, value: Any) -> None:
     _turn(by, value.orientation)
 
 
-def _xyz(value: Any) -> tuple[float, float, float]:
-    return value.x, value.y, value.z
+def _xyz(value: Any) -> list[float]:
+    return [value.x, value.y, value.z]
 
 
 def _put(value: Any, numbers: Any) -> None:
@@ -123,7 +116,7 @@ def _put(value: Any, numbers: Any) -> None:
 
 
 def _turn(by: RigidTransform, value: Any) -> None:
-    value.x, value.y, value.z, value.w = by.quaternion((value.x, value.y, value.z, value.w))
+    value.x, value.y, value.z, value.w = by.quaternion([value.x, value.y, value.z, value.w])
 
 
 def _move_pair(move: Any, first: Any, second: Any) -> None:

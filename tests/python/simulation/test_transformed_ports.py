@@ -43,9 +43,9 @@ class SensorCore(Core[SensorShell]):
 
 class MapShell(Shell):
     lookup = request_port(LookupTransform)
-    thing = transformed_read_port(PointStamped, to="map", lookup="lookup")
-    elsewhere = transformed_read_port(PointStamped, to="moon", lookup="lookup")
-    same = transformed_read_port(PointStamped, to="base", lookup="lookup")
+    thing = transformed_read_port(PointStamped, to="map", lookup=lookup)
+    elsewhere = transformed_read_port(PointStamped, to="moon", lookup=lookup)
+    same = transformed_read_port(PointStamped, to="base", lookup=lookup)
 
 
 class MapCore(Core[MapShell]):

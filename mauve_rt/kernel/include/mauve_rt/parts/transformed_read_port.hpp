@@ -49,7 +49,7 @@ class TransformedReadPort {
   TransformedReadPort(ReadPort<T>& port, CallPort<CallOf<LookupTransform>>& lookup, const Frames& frames)
       : port_(port), lookup_(lookup), to_(frames.to), from_(frames.from), is_latest_(frames.is_latest) {}
 
-  /// [rt] wherever both ports are.
+  /// [rt] as far as the services are that both ports are connected to.
   TransformedSample<T> read() {
     const Sample<T> sample = port_.read();
     TransformedSample<T> found{.status = sample.status, .time_ns = sample.time_ns};
