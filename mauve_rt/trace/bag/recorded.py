@@ -104,6 +104,9 @@ class Split:
         return ""
 
 
+MIN_WINDOW_BYTES = 100_000
+
+
 @dataclass(frozen=True, kw_only=True)
 class Window:
     """The last seconds that a recording keeps in memory, for snapshots, instead of writing a bag."""

@@ -64,7 +64,13 @@ class _Words(NamedTuple):
 class WrittenSnapshot:
     """A snapshot that a thread of its own writes. From any thread."""
 
-    def __init__(self, directory: Path, write: Callable[[Path], tuple[int, Snapshot]]) -> None:
+    def __init__(
+        self,
+        directory: Path,
+        write: Callable[[Path], tuple[int, Snapshot]],
+        *,
+        on_error: Callable[[str], None],
+    ) -> None:
         """Begin; `write` creates the bag, and returns how many messages are in it."""
         self.directory = directory
         self.error = ""
@@ -72,6 +78,7 @@ class WrittenSnapshot:
         self.messages = 0
         self.snapshot: Snapshot | None = None
         self._write = write
+        self._on_error = on_error
         self._thread = threading.Thread(target=self._run, name="snapshot", daemon=True)
         self._thread.start()
 
@@ -84,7 +91,8 @@ class WrittenSnapshot:
         try:
             self.messages, self.snapshot = self._write(self.directory)
         except Exception as error:  # noqa: BLE001 - whatever ends it, the executor lives on
-            self.error = str(error) or type(error).__name__
+            self.error = f"the snapshot is not complete: {error or type(error).__name__}"
+            self._on_error(self.error)
 
 
 class RecentBag:
@@ -229,7 +237,7 @@ class RecentBag:
         with self._changed:
             if self._written is not None and not self._written.wait(0):
                 return None
-            self._written = WrittenSnapshot(directory, self._write)
+            self._written = WrittenSnapshot(directory, self._write, on_error=self._on_error)
             return self._written
 
     @property
