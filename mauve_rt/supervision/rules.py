@@ -104,7 +104,7 @@ class Rule(Section):
     )
     snapshot: bool = setting(
         Flag(),
-        "when `do` begins, the executor writes a snapshot of the last seconds of its recording (bag_snapshot_s)",
+        "when `do` begins, the executor writes the last seconds of its recording as a bag (bag_snapshot_s)",
         default=False,
     )
 

@@ -281,7 +281,8 @@ class Recording:
 
     def takes(self, topic: str) -> bool:
         """Whether the topic is recorded as one of other nodes, as it was asked for."""
-        return any(each.full_name == topic for each in self._chosen)
+        received = self._received
+        return received is not None and any(each.full_name == topic for each in received.chosen)
 
     def look(self) -> None:
         """Take topics that patterns take now, and warn of those that do not fit. One thread at a time."""
@@ -441,7 +442,9 @@ class RecordingOrders:
         bag = str(written.directory)
         if not written.wait(_SNAPSHOT_WAIT_S):
             text = f"{bag} is still being written after {_SNAPSHOT_WAIT_S:g} s; the recording goes on. "
-            return Outcome(code=Code.TIMEOUT, message=f"{text}Check the bag: mauve trace check {bag}", bag=bag)
+            return Outcome(
+                code=Code.TIMEOUT, message=f"{text}Check the bag: mauve trace check {bag}", bag=bag
+            )
         if written.error:
             raise RefusalError(Code.PREPARE_FAILED, written.error)
         assert written.snapshot is not None  # noqa: S101 - for mypy

@@ -24,8 +24,8 @@ PARAMETERS: dict[str, Setting] = {
     "architecture": Setting("", "architecture file"),
     "bag": Setting(
         "",
-        "folder of a bag to record from the start; must not exist yet; with bag_snapshot_s the folder in which "
-        "snapshots are created; empty: no recording",
+        "folder of a bag to record from the start; must not exist yet; with bag_snapshot_s the folder in "
+        "which snapshots are created; empty: no recording",
         _CONFIGURED,
     ),
     "bags": Setting("", "folder in which ~/start_recording creates bags; empty: the working directory"),

@@ -28,7 +28,7 @@ class _Piece(NamedTuple):
     architecture: bytes = b""
     received: Mapping[str, int] = _NO_COUNTS
     lost: Mapping[str, int] = _NO_COUNTS
-    others: Mapping[str, Entry] = {}  # noqa: RUF012 - never changed
+    others: Mapping[str, Entry] = {}
     dropped: int = 0
 
     @property
@@ -122,7 +122,7 @@ class RecentBag:
         keeper: Path | None = None,
         compression: str = "none",
     ) -> None:
-        """Keep nothing yet; `directory`: snapshots are written below it. Else as TraceBag of each snapshot."""
+        """Keep nothing yet; `directory`: snapshots are created in it. Else as TraceBag."""
         self.directory = directory
         self._words = words
         self._window = window

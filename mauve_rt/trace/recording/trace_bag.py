@@ -15,6 +15,7 @@ from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessag
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
+from mauve_rt.trace.recording.latched import LatchedMessages
 from mauve_rt.trace.recording.ledger import (
     DROPPED_MESSAGES,
     INTERRUPTIONS,
@@ -24,7 +25,6 @@ from mauve_rt.trace.recording.ledger import (
     Interruption,
     Snapshot,
 )
-from mauve_rt.trace.recording.latched import LatchedMessages
 from mauve_rt.trace.recording.sources import Drain, TraceWords
 
 BATCHES = "trace/batches"

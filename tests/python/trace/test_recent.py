@@ -190,8 +190,10 @@ def test_losses_in_the_window_are_losses_of_the_snapshot(tmp_path: Path) -> None
     assert mauve_rt.trace.open(tmp_path / "now").losses["control"].lost == 4
     assert "topic /strange is not recorded" in run.errors[0]
     assert sorted(finding.text for finding in check_bag(tmp_path / "now") if finding.is_loss) == [
-        "component 'control': 4 of 34 records (11.76%) are missing: 4 found no room in its ring "
-        "(trace_records in the architecture file), and the sequence numbers have gaps of 4",
+        (
+            "component 'control': 4 of 34 records (11.76%) are missing: 4 found no room in its ring "
+            "(trace_records in the architecture file), and the sequence numbers have gaps of 4"
+        ),
         "topic /strange: 1 of 1 messages that came are not in the bag",
         "topic /words: 2 of 5 messages that came are not in the bag",
     ]
@@ -267,7 +269,9 @@ def test_a_recorder_with_a_window_writes_nothing_but_snapshots(
 ) -> None:
     monkeypatch.setattr("mauve_rt.trace.recording.recent._NEWEST_S", 60.0)
     source = SyntheticSource(["control"])
-    recorder = Recorder(source, tmp_path / "bags", node_name="/e", window=Window(seconds=60), flush_period_s=0.01)
+    recorder = Recorder(
+        source, tmp_path / "bags", node_name="/e", window=Window(seconds=60), flush_period_s=0.01
+    )
     recorder.start()
     try:
         assert recorder.recent is not None

@@ -488,7 +488,9 @@ def test_a_disk_that_hangs_at_a_snapshot_holds_up_its_reply_only(
     graph.spin_until(client.service_is_ready, "the service")
     answer = client.call_async(WriteSnapshot.Request(bag="hanging"))
     graph.spin_until(hangs.exists, "the disk to hang")
-    reply = graph.ask(ReplaceCore, f"{EXECUTOR}/replace_core", component="counter", core="executor_tests/Backwards")
+    reply = graph.ask(
+        ReplaceCore, f"{EXECUTOR}/replace_core", component="counter", core="executor_tests/Backwards"
+    )
     assert reply.success, reply.message
     busy = snapshot(graph, bag="other")
     assert (busy.success, busy.code) == (False, ReplyCode.ALREADY_RUNNING)

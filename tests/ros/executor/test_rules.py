@@ -20,10 +20,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
 
+import mauve_rt.trace
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
 from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore, ResetRule, Stop
 from mauve_msgs.srv import Start as StartComponent
-import mauve_rt.trace
 from mauve_rt.control.requests import Code
 from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.recording.ledger import snapshot_of
