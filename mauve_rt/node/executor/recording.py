@@ -23,7 +23,7 @@ from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.received_topics import ReceivedTopics
 from mauve_rt.node.executor.topic_choice import Choice, TopicChoice
-from mauve_rt.trace.bag.recorded import SentMessage, Split, Window
+from mauve_rt.trace.bag.recorded import SNAPSHOT_BYTES, SentMessage, Split, Window
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
@@ -392,8 +392,7 @@ class RecordingOrders:
             )
         window = None
         if order.snapshot_s:
-            most = {"max_bytes": order.snapshot_bytes} if order.snapshot_bytes else {}
-            window = Window(seconds=order.snapshot_s, **most)
+            window = Window(seconds=order.snapshot_s, max_bytes=order.snapshot_bytes or SNAPSHOT_BYTES)
         if window is not None and not order.bag:
             bag = self._folder
         else:

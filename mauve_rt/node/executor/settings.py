@@ -14,7 +14,7 @@ from mauve_rt.file_schema.words import shown
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
 from mauve_rt.node.shared.ros_arguments import RosArguments, parse_ros_arguments
 from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage, values_of
-from mauve_rt.trace.bag.recorded import MIN_WINDOW_BYTES, Window
+from mauve_rt.trace.bag.recorded import MIN_WINDOW_BYTES, SNAPSHOT_BYTES
 
 _LIMITS = RequestLimits()
 MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
@@ -66,7 +66,7 @@ PARAMETERS: dict[str, Setting] = {
         minimum=0,
     ),
     "bag_snapshot_bytes": Setting(
-        Window(seconds=0).max_bytes,
+        SNAPSHOT_BYTES,
         "largest memory of bag_snapshot_s, in bytes; beyond it the oldest data is dropped sooner",
         _CONFIGURED,
         minimum=MIN_WINDOW_BYTES,

@@ -105,6 +105,8 @@ class Split:
 
 
 MIN_WINDOW_BYTES = 100_000
+SNAPSHOT_BYTES = 268_435_456  # 256 MiB
+"""Default of the memory for snapshots."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,5 +114,5 @@ class Window:
     """The last seconds that a recording keeps in memory, for snapshots, instead of writing a bag."""
 
     seconds: float
-    max_bytes: int = 256 << 20
+    max_bytes: int = SNAPSHOT_BYTES
     """Of the memory: beyond it the oldest records and messages are dropped sooner."""
