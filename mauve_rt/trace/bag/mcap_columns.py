@@ -5,6 +5,7 @@ The executor does not load this module: it records without numpy.
 
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,6 +27,7 @@ _HEAD = np.dtype(
 )
 """The begin of the record of a message."""
 _FIXED_BYTES = 22  # of these, what `length` counts, too
+_FEW = 2  # a file may have its messages outside of chunks, one by one
 _AT_0 = np.zeros(1, np.int64)
 
 
@@ -64,20 +66,21 @@ class MessageColumns:
         """Bytes of the payload of each message."""
         return (self.heads["length"] - np.uint64(_FIXED_BYTES)).astype(np.int64)
 
+    @cached_property
     def firsts(self) -> Mapping[int, int]:
-        """Return the first message of each channel, in their order."""
-        if len(self) == 1:
-            return {int(self.heads["channel"][0]): 0}
+        """The first message of each channel, in their order."""
+        if len(self) < _FEW:
+            return {int(self.heads["channel"][0]): 0} if len(self) else {}
         channels, firsts = np.unique(self.heads["channel"], return_index=True)
         order = np.argsort(firsts)
         return dict(zip(channels[order].tolist(), firsts[order].tolist(), strict=True))
 
     def counts(self) -> Mapping[int, int]:
         """Return how many messages each channel has, in the order in which they first come."""
-        if len(self) == 1:
-            return {int(self.heads["channel"][0]): 1}
+        if len(self) < _FEW:
+            return dict.fromkeys(self.firsts, 1)
         counts = np.bincount(self.heads["channel"])
-        return {channel: int(counts[channel]) for channel in self.firsts()}
+        return {channel: int(counts[channel]) for channel in self.firsts}
 
     def of_channel(self, channel: int) -> Integers:
         """Return which messages are of this channel."""

@@ -64,7 +64,7 @@ class _ChunkSeen:
         found = self._found.messages
         log_times = found.heads["log_time_ns"]
         entries: Entries = {}
-        for channel in found.firsts():
+        for channel in found.firsts:
             rows = found.of_channel(channel)
             entries[channel] = list(zip(log_times[rows].tolist(), found.at[rows].tolist(), strict=True))
         return entries

@@ -96,7 +96,8 @@ class McapScan:
         except OSError as error:
             msg = f"bag file {path}: cannot be read ({error.strerror})"
             raise TraceError(msg) from error
-        self._limits = McapLimits(f"bag file {path}", self.size)
+        self._known_size = self.size
+        self._limits = McapLimits(f"bag file {path}", self._known_size)
         try:
             self.header = self._read_header()
         except BaseException:
@@ -221,8 +222,10 @@ class McapScan:
             raise EOFError(msg)
         opcode, length = HEAD.unpack(head)
         end = offset + HEAD.size + length
-        if end > self.size:
-            msg = f"a record of {length:,} bytes does not fit into the file's {self.size:,}"
+        if end > self._known_size:
+            self._known_size = self.size  # it may have grown
+        if end > self._known_size:
+            msg = f"a record of {length:,} bytes does not fit into the file's {self._known_size:,}"
             raise EOFError(msg)
         if opcode == 0:
             msg = "no record begins here"
@@ -267,7 +270,7 @@ class McapScan:
 
     def _check_channels(self, messages: MessageColumns, defined: Mapping[int, int]) -> None:
         """See that each channel is defined before its first message; `defined`: in the chunk, before which."""
-        for channel, first in messages.firsts().items():
+        for channel, first in messages.firsts.items():
             if channel not in self.channels and first < defined.get(channel, len(messages)):
                 self._check_channel(channel, self.channels)
 
@@ -300,16 +303,29 @@ class _Walk:
             TraceError: there are more than is read.
 
         """
-        places = self.places
-        for self.count, (opcode, at, begin, stop) in enumerate(split_records(self._data), start=1):
-            if self.count > self._most:
+        # Not by split_records(): there are millions, and so a record takes 0.2 us in place of 0.5 us.
+        data, most, note, unpack = self._data, self._most, self.places.append, HEAD.unpack_from
+        head, size = HEAD.size, len(self._data)
+        at, last, count = 0, size - head, 0
+        while at <= last:
+            opcode, length = unpack(data, at)
+            begin = at + head
+            stop = begin + length
+            if stop > size:
+                break
+            count += 1
+            if count > most:
                 self._limits.refuse_records()
             if opcode == _MESSAGE:
-                if stop - begin < MESSAGE_BYTES:
-                    read_message(self._data, begin, stop)
-                places.append(at)
+                if length < MESSAGE_BYTES:
+                    read_message(data, begin, stop)
+                note(at)
             elif opcode in _DEFINITIONS:  # nothing else belongs here
                 self._define(opcode, begin, stop)
+            at = stop
+        for _ in split_records(data[at:]):  # says why the last one is not whole
+            pass
+        self.count = count
 
     def _define(self, opcode: int, begin: int, stop: int) -> None:
         self._limits.define(opcode, self._data[begin : begin + 2], stop - begin)

@@ -113,7 +113,7 @@ class StoredMessages:
                 counts = found.messages.counts()
                 if counts:
                     self._note(found, counts)
-                yield counts, found.messages.messages
+                    yield counts, found.messages.messages
         else:
             for _, message in scan.messages():
                 yield {message.channel_id: 1}, functools.partial(_only, message)
@@ -153,7 +153,7 @@ class StoredMessages:
         for data in _joined(self._pieces(wanted)):
             found = _columns_of(data)
             begins, sizes = found.begins, found.sizes
-            for number in sorted(found.firsts()):
+            for number in sorted(found.firsts):
                 if number in wanted:
                     rows = found.of_channel(number)
                     yield MessageBlock(
