@@ -209,10 +209,11 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             chunk_count += isinstance(record, Chunk)
             if found.opcode in others:
                 others[found.opcode] += 1
-            log_times = found.messages.heads["log_time_ns"]
-            for channel, count in found.messages.counts().items():
-                times = log_times[found.messages.of_channel(channel)]
-                counts.add_many(channel, count, start_ns=int(times.min()), end_ns=int(times.max()))
+            if len(found.messages):
+                times = found.messages.heads["log_time_ns"]
+                start_ns, end_ns = int(times.min()), int(times.max())
+                for channel, count in found.messages.counts().items():
+                    counts.add_many(channel, count, start_ns=start_ns, end_ns=end_ns)
             progress(scan.whole_bytes / max(scan.size, 1), "examining")
         told = scan.summary()
         whole_bytes, missing = scan.whole_bytes, b""
