@@ -269,7 +269,7 @@ class McapScan:
         return Found(offset, end, int(Opcode.CHUNK), chunk, walk.definitions, messages)
 
     def _check_channels(self, messages: MessageColumns, defined: Mapping[int, int]) -> None:
-        """See that each channel is defined before its first message; `defined`: in the chunk, before which."""
+        """See that each channel is defined before its messages; `defined`: as of the chunk's _Walk."""
         for channel, first in messages.firsts.items():
             if channel not in self.channels and first < defined.get(channel, len(messages)):
                 self._check_channel(channel, self.channels)

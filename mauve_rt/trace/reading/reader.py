@@ -103,9 +103,7 @@ class _Content:
         self._kinds: dict[int, RecordKind] = {}
         self._shadows: list[Shadow] = []  # with times of CLOCK_REALTIME
 
-    def add(
-        self, scan: "McapScan | SqliteScan", counts: Mapping[int, int], messages_of: MessagesOf
-    ) -> None:
+    def add(self, scan: "McapScan | SqliteScan", counts: Mapping[int, int], messages_of: MessagesOf) -> None:
         own: dict[int, tuple[Channel, str]] = {}
         for number, count in counts.items():
             channel = scan.channels[number]
@@ -116,9 +114,7 @@ class _Content:
                 own[number] = (channel, type_name)
         if own:
             for message in messages_of(own):
-                self._add_own(
-                    scan, *own[message.channel_id], message.data, published_ns=message.publish_time
-                )
+                self._add_own(scan, *own[message.channel_id], message.data, published_ns=message.publish_time)
 
     def _add_own(
         self,

@@ -72,7 +72,10 @@ SHORT = HEAD.pack(Opcode.MESSAGE, 3) + b"abc"
         (serialized(ONE, message(1, 0), message(2, 1), TWO), UNKNOWN),
         (serialized(ONE, message(2, 0)) + TORN, UNKNOWN),
         (serialized(ONE, message(2, 0)) + SHORT, UNKNOWN),
-        (serialized(ONE, message(1, 0)) + TORN + serialized(message(2, 1)), "a record of 500 bytes does not fit"),
+        (
+            serialized(ONE, message(1, 0)) + TORN + serialized(message(2, 1)),
+            "a record of 500 bytes does not fit",
+        ),
         (serialized(ONE, message(1, 0)) + SHORT, "a Message of 3 bytes is shorter than its head"),
         (serialized(ONE, message(1, 0)) + b"tail", "4 bytes behind the last record are none"),
     ],
