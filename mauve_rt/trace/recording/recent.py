@@ -91,8 +91,8 @@ class WrittenSnapshot:
         try:
             self.messages, self.snapshot = self._write(self.directory)
         except Exception as error:  # noqa: BLE001 - whatever ends it, the executor lives on
-            self.error = f"the snapshot is not complete: {error or type(error).__name__}"
-            self._on_error(self.error)
+            self.error = str(error) or type(error).__name__
+            self._on_error(f"snapshot: {self.error}")
 
 
 class RecentBag:
@@ -134,6 +134,7 @@ class RecentBag:
         self._changed = threading.Condition()
         self._pieces: deque[_Piece] = deque()
         self._sizes: deque[int] = deque()  # of the pieces
+        self._bytes = 0  # of all
         self._before: _Piece | None = None
         self._latched = LatchedMessages()  # of what is held no longer
         self._is_begun = False  # something is held no longer
@@ -204,9 +205,10 @@ class RecentBag:
         with self._changed:
             self._pieces.append(piece)
             self._sizes.append(piece.size)
+            self._bytes += piece.size
             oldest_ns = drain.monotonic_ns - round(self._window.seconds * 1e9)
             while len(self._pieces) > 1 and (
-                self._pieces[0].drain.monotonic_ns <= oldest_ns or sum(self._sizes) > self._window.max_bytes
+                self._pieces[0].drain.monotonic_ns <= oldest_ns or self._bytes > self._window.max_bytes
             ):
                 self._drop_oldest()
             self._sealed += 1
@@ -224,7 +226,7 @@ class RecentBag:
 
     def _drop_oldest(self) -> None:
         piece = self._pieces.popleft()
-        self._sizes.popleft()
+        self._bytes -= self._sizes.popleft()
         for message in piece.messages:
             self._latched.keep(message)
         self._before = piece._replace(messages=(), drain=piece.drain._replace(records=b""))

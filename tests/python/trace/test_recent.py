@@ -147,7 +147,7 @@ def test_a_snapshot_may_be_written_again_and_again(tmp_path: Path) -> None:
     assert seconds_of(tmp_path / "second") == [3, 4, 5]
     again = run.snapshot(tmp_path / "second")
     assert "exists already" in again.error
-    assert run.errors == [again.error]
+    assert run.errors == [f"snapshot: {again.error}"]
     assert seconds_of(tmp_path / "second") == [3, 4, 5]
 
 
@@ -259,7 +259,7 @@ def test_a_disk_that_is_full_leaves_a_bag_that_says_so(
     monkeypatch.setattr(Disk, "write", fail)
     written = run.snapshot(tmp_path / "now")
     assert "No space left on device" in written.error
-    assert run.errors == [written.error]
+    assert run.errors == [f"snapshot: {written.error}"]
     texts = [finding.text for finding in check_bag(tmp_path / "now") if finding.is_loss]
     assert any("the bag has its begin only" in one for one in texts), texts
 
