@@ -4,7 +4,7 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.file_schema.schema_errors import owner, read_content
@@ -12,7 +12,7 @@ from mauve_rt.file_schema.words import did_you_mean, listed
 from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
 from mauve_rt.model.schema import ComponentModel, FileModel, PropertyValue, ResourceModel
-from mauve_rt.model.substitution import substituted_property
+from mauve_rt.model.substitution import substituted_frame, substituted_property
 
 if TYPE_CHECKING:
     from mauve_rt.model.modelled_parts import ModelledParts
@@ -81,6 +81,32 @@ class ArchitectureModel:
             if owning == component:
                 values[name] = self._substituted(component, name, value, Path.cwd())
         return values
+
+    def frames(self, component: str) -> dict[str, tuple[str, str]]:
+        """(frame, child_frame) of the ports of a component as the file declares them; empty: it does not.
+
+        Raises:
+            ArchitectureFileError: a place in a name is empty.
+        """
+        return {
+            port: self._substituted_frames(("components", component, "frames", port), declared)
+            for port, declared in self.components[component].frames.items()
+        }
+
+    def resource_frames(self, resource: str) -> tuple[str, str]:
+        """(frame, child_frame) of a resource, as frames()."""
+        return self._substituted_frames(("resources", resource), self.resources[resource])
+
+    def _substituted_frames(self, place: Location, declared: Any) -> tuple[str, str]:
+        try:
+            frame, child_frame = (
+                substituted_frame(name, self) if name else ""
+                for name in (declared.frame, declared.child_frame)
+            )
+        except LookupError as error:
+            problem = self.problem(place, "bad frame", found=str(error.args[0]))
+            raise ArchitectureFileError(self.path, [problem]) from None
+        return frame, child_frame
 
     def property_place(self, component: str, name: str) -> Location:
         """Where a property of a component is set."""
