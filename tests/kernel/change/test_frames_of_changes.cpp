@@ -86,17 +86,21 @@ TEST_F(FramesOfChanges, APortThatGoesMakesRoomForAnotherFrame) {
 
 TEST_F(FramesOfChanges, AMessageInAnotherFrameThanAPortDeclaresIsRefused) {
   architecture.connect("b", "map", "pose", "read");
-  architecture.connect("a", "any", "pose", "write");
-  auto& shell = dynamic_cast<FramedShell&>(architecture.component("a").shell());
-  EXPECT_FALSE(shell.any.write({.header = {.frame_id = "odom"}}));
-  EXPECT_TRUE(shell.any.write({.value = 1.0}));
-  auto& reader = dynamic_cast<FramedShell&>(architecture.component("b").shell());
-  EXPECT_EQ("map", reader.map.read().value.header.frame_id.view());
-  EXPECT_EQ(1U, architecture.find_resource("pose")->refused_values());
+  const auto resource = architecture.find_resource("pose");
+  WritePort<Stamped> writer("writer");
+  ReadPort<Stamped> reader("reader");
+  writer.connect(*resource->find_service("write"), "pose");
+  reader.connect(*resource->find_service("read"), "pose");
+  EXPECT_FALSE(writer.write({.header = {.frame_id = "odom"}}));
+  EXPECT_TRUE(writer.write({.value = 1.0}));
+  EXPECT_EQ("map", reader.read().value.header.frame_id.view());
+  EXPECT_EQ(1U, resource->refused_values());
+  writer.disconnect();
+  reader.disconnect();
 }
 
 TEST_F(FramesOfChanges, ANewShellWithAnotherFrameIsRefused) {
-  architecture.add_resource<SharedData<Stamped>>("in_map");
+  architecture.configure();
   commit(std::move(Transaction().connect("a", "map", "pose", "read").connect("b", "map", "pose", "read")));
   const ErrorDetail detail =
       refused(std::move(Transaction().replace_shell("b", std::make_unique<OtherShell>())));
