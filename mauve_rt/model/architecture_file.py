@@ -4,14 +4,14 @@ import os
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.file_schema.schema_errors import owner, read_content
 from mauve_rt.file_schema.words import did_you_mean, listed
 from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
-from mauve_rt.model.schema import ComponentModel, FileModel, PropertyValue, ResourceModel
+from mauve_rt.model.schema import ComponentModel, FileModel, FramesModel, PropertyValue, ResourceModel
 from mauve_rt.model.substitution import substituted_frame, substituted_property
 
 if TYPE_CHECKING:
@@ -89,15 +89,16 @@ class ArchitectureModel:
             ArchitectureFileError: a place in a name is empty.
         """
         return {
-            port: self._substituted_frames(("components", component, "frames", port), declared)
+            port: self.frames_of(declared, ("components", component, "frames", port))
             for port, declared in self.components[component].frames.items()
         }
 
     def resource_frames(self, resource: str) -> tuple[str, str]:
         """(frame, child_frame) of a resource, as frames()."""
-        return self._substituted_frames(("resources", resource), self.resources[resource])
+        return self.frames_of(self.resources[resource], ("resources", resource))
 
-    def _substituted_frames(self, place: Location, declared: Any) -> tuple[str, str]:
+    def frames_of(self, declared: FramesModel | ResourceModel, place: Location) -> tuple[str, str]:
+        """(frame, child_frame) of a declaration at that place, as frames()."""
         try:
             frame, child_frame = (
                 substituted_frame(name, self) if name else ""

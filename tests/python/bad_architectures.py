@@ -467,6 +467,41 @@ BAD = {
         "2.5",
         "bad longest_hold_ns of resource 'queue': expected a whole number, found 2.5",
     ),
+    "frame with a slash": (
+        "capacity: 4",
+        "capacity: 4, frame: /map",
+        "/map",
+        "bad frame of resource 'queue': expected a frame such as map or $(name)/base: no spaces, no slash",
+    ),
+    "frame with a space": ("capacity: 4", "capacity: 4, child_frame: a base", "a base", "bad child_frame of"),
+    "empty frame": ("capacity: 4", 'capacity: 4, frame: ""', '""', "bad frame of resource 'queue'"),
+    "unknown place in a frame": (
+        "reconfigurable: false",
+        "frames: {set: $(nme)/base}",
+        "$(nme)/base",
+        "bad set in frames of component 'sink'",
+    ),
+    "no frame": ("reconfigurable: false", "frames: {set: {}}", "set: {}", "expected frame or child_frame"),
+    "frame of no port": (
+        "reconfigurable: false",
+        "frames: {sett: map}",
+        "sett: map",
+        "component 'sink' has no port 'sett' that reads or writes values; did you mean set?",
+    ),
+    "port and resource in different frames": (
+        "{kind: shared_data,",
+        "{kind: shared_data, frame: odom,",
+        "[source.count, count.write]",
+        "component 'source': port count: the port and the resource are in different frames; expected frame "
+        "map, as the port declares, found frame odom of count.write; connect another resource,",
+    ),
+    "ports in different frames": (
+        "reconfigurable: false",
+        "frames: {set: odom}",
+        "[sink.set, count.read]",
+        "component 'sink': port set: two ports of a resource are in different frames; expected frame odom, "
+        "as the port declares, found frame map of port source.count at count.write; connect another",
+    ),
     "syntax": ("resources:", "resources: [}", "}", "not YAML"),
     "tab": ("    core: executor", "\tcore: executor", "\tcore", "not YAML: found character '\\t'"),
 }
