@@ -156,9 +156,7 @@ def _drawing(
 def _resource(name: str, one: ResourceModel, model: ArchitectureModel) -> Any:
     namespace = model.namespace
     frame, child_frame = model.frames_of(one, ("resources", name))
-    found = SimpleNamespace(
-        name=name, kind=one.kind, type=one.type, frame=frame, child_frame=child_frame
-    )
+    found = SimpleNamespace(name=name, kind=one.kind, type=one.type, frame=frame, child_frame=child_frame)
     if one.topic is not None:
         side = "publishes" if one.topic.direction == "publish" else "subscribes"
         setattr(found, side, full_name(one.topic.name, namespace))

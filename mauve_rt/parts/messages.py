@@ -69,7 +69,7 @@ def frame_ids(of_class: Any) -> int:
 def in_frames(message: Any, frame: str, child_frame: str) -> Any:
     """The message, or a copy of it with the frames that it lacks."""
     lacks_frame = bool(frame) and not message.header.frame_id
-    lacks_child = bool(child_frame) and frame_ids(type(message)) > 1 and not message.child_frame_id
+    lacks_child = bool(child_frame) and frame_ids(message.__class__) > 1 and not message.child_frame_id
     if not lacks_frame and not lacks_child:
         return message
     filled = copy.copy(message)

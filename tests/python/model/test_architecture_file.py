@@ -127,7 +127,9 @@ def test_frames_have_the_name_of_the_robot(tmp_path: Path, plugin_prefix: Path) 
     assert (count.frame, count.child_frame) == ("robot_1/odom", "")
     path = tmp_path / "of_the_root.yaml"
     path.write_text(GOOD.replace("/robot_1", "/").replace("capacity: 4", "capacity: 4, frame: $(name)"))
-    with pytest.raises(ArchitectureFileError, match=r"bad frame.*\$\(name\), which is empty in namespace '/'"):
+    with pytest.raises(
+        ArchitectureFileError, match=r"bad frame.*\$\(name\), which is empty in namespace '/'"
+    ):
         build(load_architecture(path), REGISTRY)
 
 

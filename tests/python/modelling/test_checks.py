@@ -94,7 +94,7 @@ def test_the_papers_guidance_is_a_model() -> None:
         (
             "goal: {read: Point2D}",
             "goal: {read: Point2D}\n      done: {event: true, child_frame: map}",
-            "bad child_frame in ports.done of shell 'GuidanceShell': expected nothing: only a port that reads",
+            "bad child_frame in ports.done of shell 'GuidanceShell': expected nothing: only a port that",
         ),
         ("default: 0.1", "default: 7", "bad default in properties.target_threshold of shell 'GuidanceShell'"),
         ("shell: GuidanceShell", "shell: GuidanceShel", "there is no shell 'GuidanceShel'; did you mean"),

@@ -1,4 +1,4 @@
-"""Frames of ports and resources from Python: what connects, and what is written; on threads and in virtual time."""
+"""Frames of ports and resources from Python, on threads and in virtual time."""
 
 from collections.abc import Callable, Iterator
 from typing import Any
@@ -85,7 +85,9 @@ def connect(framed: Stage, *places: str) -> None:
         framed.architecture.connect(*place.split())
 
 
-def test_a_message_gets_the_declared_frames_and_another_one_is_refused(framed: Stage, host: Callable[[], Any]) -> None:
+def test_a_message_gets_the_declared_frames_and_another_one_is_refused(
+    framed: Stage, host: Callable[[], Any]
+) -> None:
     connect(framed, "source out odometry write", "sink plain odometry read")
     host()
     host()

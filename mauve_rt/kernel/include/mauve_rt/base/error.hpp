@@ -38,8 +38,7 @@ enum class ErrorCode : std::uint16_t {
   unknown_type,
   /// Two elements that belong together have different types. Give both elements the type that the message expects.
   type_mismatch,
-  /// Elements that are connected declare different frames. Connect another resource, transform the values first, or correct a
-  /// declaration.
+  /// Two connected elements declare different frames. Connect another resource, transform the values, or correct a frame.
   frame_mismatch,
   /// A number is outside its range. Choose a number within the range that the message names.
   out_of_range,
