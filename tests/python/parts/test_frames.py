@@ -4,11 +4,12 @@ from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import Point, PoseStamped
 from nav_msgs.msg import Odometry
-from python_parts import ActFsm, Stage
+from python_parts import ActFsm, IdleCore, Stage
 
 from mauve_rt.api import Core, MauveError, SharedData, Shell, Simulation, Transaction, read_port, write_port
+from mauve_rt.parts.messages import serialize
 
 
 class OdometryShell(Shell):
@@ -115,6 +116,19 @@ def test_a_resource_in_another_frame_is_not_connected(framed: Stage) -> None:
     with pytest.raises(MauveError, match="expected child_frame base") as caught:
         connect(framed, "source out raw write")
     assert caught.value.code == "frame_mismatch"
+
+
+def test_of_a_type_without_a_header_connections_are_checked(framed: Stage) -> None:
+    class PointShell(Shell):
+        out = write_port(Point, frame="odom", optional=True)
+
+    framed.add("point", PointShell, IdleCore)
+    framed.architecture.add_resource("in_map", SharedData(Point), frame="map")
+    framed.architecture.add_resource("in_odom", SharedData(Point), frame="odom")
+    with pytest.raises(MauveError, match="different frames"):
+        connect(framed, "point out in_map write")
+    connect(framed, "point out in_odom write")
+    assert framed.deploy().write_resource("in_odom", serialize(Point(x=1.0)))
 
 
 def test_frames_are_described(framed: Stage) -> None:

@@ -164,12 +164,15 @@ def test_a_message_that_is_too_large_is_refused_and_counted(bind: Bind, graph: A
 
 
 @pytest.mark.parametrize(
-    ("of_class", "capacities"),
-    [(LaserScan, ""), (JointState, "capacity: {name: 1, position: 1, velocity: 1, effort: 1}, ")],
+    ("of_class", "capacities", "filled"),
+    [
+        (LaserScan, "", ""),
+        (JointState, "capacity: {name: 1, position: 1, velocity: 1, effort: 1}, ", "robot/base"),
+    ],
     ids=["only Python has the type", "a library has the type"],
 )
 def test_a_message_in_another_frame_is_refused_counted_and_explained(
-    bind: Bind, graph: Any, of_class: Any, capacities: str
+    bind: Bind, graph: Any, of_class: Any, capacities: str, filled: str
 ) -> None:
     bound = bind(f"""\
   value: {{kind: shared_data, type: sensor_msgs/msg/{of_class.__name__}, frame: robot/base,
@@ -195,6 +198,9 @@ def test_a_message_in_another_frame_is_refused_counted_and_explained(
     resource = next(each for each in bound.runtime.described_resources() if each.name == "value")
     assert resource.refused_values >= 1
     assert resource.why_refused_value == report.refusal
+    passed = report.passed
+    told("", lambda: bound.report("/robot/value").passed - passed)
+    assert bound.received("value", of_class).header.frame_id == filled
 
 
 def test_an_event_is_an_empty_message_or_a_true_one(bind: Bind, graph: Any) -> None:
