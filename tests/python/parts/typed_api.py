@@ -95,7 +95,8 @@ class Map(Resource):
 class HoverShell(Shell):
     pose = read_port(Pose)
     start = read_port(Pose, default=Pose())
-    target = write_port(Pose, on_commit="hold", on_stop="set_zero")
+    target = write_port(Pose, on_commit="hold", on_stop="set_zero", frame="map", child_frame="base")
+    seen = read_port(Pose, frame="map", child_frame="base")
     get = call_port(Map.get)
     visit = call_port("package/Visitor")
     look = request_port(LookupTransform)
