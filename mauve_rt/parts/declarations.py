@@ -94,17 +94,17 @@ def transformed_read_port(
     *,
     to: str,
     lookup: RequestPort,
-    source: str = "",
+    frame: str = "",
     latest: bool = False,
     optional: bool = False,
 ) -> TransformedReadPort[T]:
     """A port to read from whose values are in its own frame, `to`.
 
-    `lookup`: the shell's `request_port(LookupTransform)`. `source`: the frame of values without a
+    `lookup`: the shell's `request_port(LookupTransform)`. `frame`: that of values without a
     header, or with an empty frame_id. `latest`: by the latest transform, in the place of that at the time at
     which the value was written.
     """
-    return TransformedReadPort(type, to=to, lookup=lookup, source=source, latest=latest, optional=optional)
+    return TransformedReadPort(type, to=to, lookup=lookup, frame=frame, latest=latest, optional=optional)
 
 
 def request_port(service: Any) -> RequestPort:

@@ -36,12 +36,12 @@ class TransformedReadPort(ReadPort[T]):
         *,
         to: str,
         lookup: RequestPort,
-        source: str = "",
+        frame: str = "",
         latest: bool = False,
         optional: bool = False,
     ) -> None:
-        super().__init__(type, optional=optional)
-        self._to, self._lookup, self._source, self._latest = to, lookup, source, latest
+        super().__init__(type, frame=frame, optional=optional)
+        self._to, self._lookup, self._latest = to, lookup, latest
 
     def read(self) -> TransformedSample[T]:
         """The present value in the port's frame, by the transform at the time at which it was written.
@@ -52,7 +52,7 @@ class TransformedReadPort(ReadPort[T]):
         """
         sample = super().read()
         header = getattr(sample.value, "header", None)
-        source = (header.frame_id if header is not None else "") or self._source
+        source = (header.frame_id if header is not None else "") or self.frame
         if sample.status == "none" or source == self._to:
             return TransformedSample(sample.value, sample.status, sample.time_ns)
         time_ns = 0 if self._latest else sample.time_ns

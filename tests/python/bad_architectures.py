@@ -266,7 +266,7 @@ BAD = {
         "kind: ring_buffer",
         "kind: ringbuffer",
         "ringbuffer",
-        "expected shared_data, ring_buffer, latest_value, event, client or",
+        "expected shared_data, ring_buffer, latest_value, event, client, transform_tree or",
     ),
     "ring without capacity": (
         ", capacity: 4",

@@ -75,7 +75,7 @@ struct SeeShell : Shell {
   CallPort<CallOf<LookupTransform>>& lookup = call_port<LookupTransform>("lookup");
   TransformedReadPort<Seen> thing{read_port<Seen>("thing"), lookup, {.to = "map"}};
   TransformedReadPort<Seen> latest{read_port<Seen>("latest"), lookup, {.to = "map", .is_latest = true}};
-  TransformedReadPort<Bare> push{read_port<Bare>("push"), lookup, {.to = "map", .from = "base"}};
+  TransformedReadPort<Bare> push{read_port<Bare>("push").in_frame("base"), lookup, {.to = "map"}};
   TransformedReadPort<Bare> lost{read_port<Bare>("lost"), lookup, {.to = "map"}};
   WritePort<Seen>& seen = write_port<Seen>("seen");
   WritePort<Bare>& pushed = write_port<Bare>("pushed");

@@ -100,7 +100,7 @@ class HoverShell(Shell):
     get = call_port(Map.get)
     visit = call_port("package/Visitor")
     look = request_port(LookupTransform)
-    goal = transformed_read_port(Pose, to="map", lookup=look, source="base")
+    goal = transformed_read_port(Pose, to="map", lookup=look, frame="base")
     reached = event_port()
     height = property(1.0, unit="m", description="above ground", minimum=0.0, maximum=9.0)
     tries = property(3)

@@ -38,7 +38,7 @@ enum class ErrorCode : std::uint16_t {
   unknown_type,
   /// Two elements that belong together have different types. Give both elements the type that the message expects.
   type_mismatch,
-  /// Two connected elements declare different frames. Connect another resource, transform the values, or correct a frame.
+  /// Two connected elements declare different frames. Connect another resource, read it by a TransformedReadPort, or correct a frame.
   frame_mismatch,
   /// A number is outside its range. Choose a number within the range that the message names.
   out_of_range,

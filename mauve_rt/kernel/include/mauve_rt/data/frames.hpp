@@ -38,7 +38,7 @@ struct FrameDifference {
   std::string theirs;
 };
 inline constexpr std::string_view kFrameRemedy =
-    "connect another resource, transform the values first, or correct a declaration";
+    "connect another resource, read it by a TransformedReadPort, or correct a declaration";
 /// Nothing: each name that both declare is equal. [non-rt]
 std::optional<FrameDifference> frame_difference(const Frames& ours, const Frames& theirs);
 /// Those of `first`; each one that it does not declare, of `second`. [non-rt]

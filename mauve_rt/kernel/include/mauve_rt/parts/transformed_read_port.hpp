@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/data/frames.hpp"
 #include "mauve_rt/data/port.hpp"
 #include "mauve_rt/data/transform_tree.hpp"
 #include "mauve_rt/data/transformed_values.hpp"
@@ -39,15 +40,14 @@ struct TransformedSample {
 template <typename T>
 class TransformedReadPort {
  public:
-  struct Frames {
-    std::string_view to;      // the port's own
-    std::string_view from{};  // of values without a header, or with an empty frame_id
+  struct Options {
+    std::string_view to;    // the frame of what it yields
     bool is_latest{false};  // by the latest transform that there is, in the place of that at the value's time
   };
 
-  /// [setup]
-  TransformedReadPort(ReadPort<T>& port, CallPort<CallOf<LookupTransform>>& lookup, const Frames& frames)
-      : port_(port), lookup_(lookup), to_(frames.to), from_(frames.from), is_latest_(frames.is_latest) {}
+  /// What has no header, or an empty frame_id, is in the frame that `port` declares: in_frame(), or the architecture file. [setup]
+  TransformedReadPort(ReadPort<T>& port, CallPort<CallOf<LookupTransform>>& lookup, const Options& options)
+      : port_(port), lookup_(lookup), to_(options.to), is_latest_(options.is_latest) {}
 
   /// [rt] as far as the services are that both ports are connected to.
   TransformedSample<T> read() {
@@ -68,25 +68,23 @@ class TransformedReadPort {
     if (found.outcome != TransformOutcome::done) return found;
     found.value = sample.value;
     transform_value(response.transform, found.value);
-    if constexpr (kHasFrame) found.value.header.frame_id.assign(to_.view());
+    if constexpr (HasFrame<T>) found.value.header.frame_id.assign(to_.view());
     return found;
   }
 
  private:
-  static constexpr bool kHasFrame = requires(T value) { value.header.frame_id.assign(std::string_view()); };
-
   FrameName source_of(const T& value) const MAUVE_RT {
-    if constexpr (kHasFrame) {
+    if constexpr (HasFrame<T>) {
       if (const std::string_view given = value.header.frame_id.view(); !given.empty())
         return FrameName(given);
     }
-    return from_;
+    const Frames* const declared = port_.frames();
+    return declared != nullptr ? FrameName(declared->frame) : FrameName();
   }
 
   ReadPort<T>& port_;
   CallPort<CallOf<LookupTransform>>& lookup_;
   FrameName to_;
-  FrameName from_;
   bool is_latest_;
 };
 
