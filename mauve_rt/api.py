@@ -40,6 +40,7 @@ from mauve_rt.parts.declarations import (
     property,  # noqa: A004
     read_port,
     request_port,
+    transformed_read_port,
     write_port,
 )
 from mauve_rt.parts.fsms import Fsm, PeriodicFsm, State, times
@@ -59,6 +60,7 @@ from mauve_rt.parts.resources import (
 )
 from mauve_rt.parts.shells import NativeShell, Shell
 from mauve_rt.parts.time import FOREVER, ms_to_ns, s_to_ns, us_to_ns
+from mauve_rt.parts.transformed_ports import TransformedReadPort, TransformedSample
 
 __all__ = [
     "FOREVER",
@@ -106,6 +108,8 @@ __all__ = [
     "TransformBuffer",
     "TransformLookup",
     "TransformTree",
+    "TransformedReadPort",
+    "TransformedSample",
     "WritePort",
     "call_port",
     "event_port",
@@ -120,6 +124,7 @@ __all__ = [
     "s_to_ns",
     "service",
     "times",
+    "transformed_read_port",
     "us_to_ns",
     "write_port",
 ]

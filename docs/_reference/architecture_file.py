@@ -21,6 +21,10 @@ SECTIONS: dict[type[Section], tuple[str, str]] = {
         "state",
         "`states: {NAME: {...}}` of a component. At least one key; `wcet_ns` is at most `max_execution_ns`.",
     ),
+    schema.FramesModel: (
+        "frames",
+        "`frames: {PORT: FRAME}`, or `frames: {PORT: {...}}` of a component. At least one of the two keys.",
+    ),
     schema.ResourceModel: (
         "resource",
         "`resources: {NAME: {...}}`. [The kind of the resource](#kinds-of-resources) adds keys of its own.",

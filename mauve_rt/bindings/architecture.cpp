@@ -101,28 +101,32 @@ void bind_architecture(py::module_& module) {
       .def(
           "add_resource",
           [](PyArchitecture& self, const std::string& name, const AnyResource& resource,
-             time_ns_t longest_hold_ns) {
+             time_ns_t longest_hold_ns, const std::string& frame, const std::string& child_frame) {
             Transaction transaction;
             transaction.add_resource(name, make_resource(resource, self.registry), TopicBinding::none,
-                                     longest_hold_ns);
+                                     longest_hold_ns, {.frame = frame, .child_frame = child_frame});
             commit_one(self, std::move(transaction));
           },
-          py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("longest_hold_ns") = 0)
+          py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("longest_hold_ns") = 0,
+          py::arg("frame") = "", py::arg("child_frame") = "")
       .def(
           "add_resource",
           [](PyArchitecture& self, const std::string& name, const std::string& kind, const std::string& type,
-             time_ns_t longest_hold_ns, const py::kwargs& keywords) {
+             time_ns_t longest_hold_ns, const std::string& frame, const std::string& child_frame,
+             const py::kwargs& keywords) {
             Transaction transaction;
             transaction.add_resource(name, self.registry.make_resource(kind, type, parameters_of(keywords)),
-                                     TopicBinding::none, longest_hold_ns);
+                                     TopicBinding::none, longest_hold_ns,
+                                     {.frame = frame, .child_frame = child_frame});
             commit_one(self, std::move(transaction));
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "",
-          py::arg("longest_hold_ns") = 0,
+          py::arg("longest_hold_ns") = 0, py::arg("frame") = "", py::arg("child_frame") = "",
           R"(Adds a resource of a kind; PluginRegistry.resource_kind tells its parameters.
 
 `longest_hold_ns`: the longest execution for which one user holds its lock, for the timing analysis:
-nothing enforces it. 0: what the resource's own code declares.)")
+nothing enforces it. 0: what the resource's own code declares. `frame`, `child_frame`: those of its values;
+ports that declare another frame are not connected, and messages in another frame are refused.)")
       .def(
           "connect",
           [](PyArchitecture& self, const std::string& component, const std::string& port,

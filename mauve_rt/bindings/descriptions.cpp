@@ -43,7 +43,8 @@ std::vector<PortDescription> describe_ports(const Shell& shell) {
                      .messages = port->messages(),
                      .longest_hold_ns = longest_hold_ns,
                      .on_commit = policy(port->output().on_commit),
-                     .on_stop = policy(port->output().on_stop)});
+                     .on_stop = policy(port->output().on_stop),
+                     .frames = port->frames() == nullptr ? Frames{} : *port->frames()});
   }
   return ports;
 }
@@ -71,7 +72,8 @@ ResourceDescription describe_resource(const Resource& resource) {
                                   resource.longest_hold_ns(),
                                   resource.refused_values(),
                                   resource.why_refused_value(),
-                                  resource.memory_bytes()};
+                                  resource.memory_bytes(),
+                                  resource.frame_guard().declared()};
   for (const ServiceBase* service : resource.services()) {
     description.services.push_back({service->name(), std::string(to_string(service->kind())), service->type(),
                                     service->is_call_serializable(), service->messages(),
@@ -102,7 +104,8 @@ ComponentDescription describe_component(Component& component) {
                      .resource = port.resource,
                      .service = port.service,
                      .longest_hold_ns = port.longest_hold_ns,
-                     .stop_message = port.stop_message});
+                     .stop_message = port.stop_message,
+                     .frames = port.frames});
   std::vector<PropertyDescription> properties;
   properties.reserve(shown.properties.size());
   for (const ShownProperty& property : shown.properties) properties.push_back(describe_property(property));
@@ -212,7 +215,13 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("on_commit", &PortDescription::on_commit,
                     "Of a shell's write port: 'hold' or 'set_zero'; else ''.")
       .def_readonly("on_stop", &PortDescription::on_stop,
-                    "Of a shell's write port: 'hold' or 'set_zero'; else ''.");
+                    "Of a shell's write port: 'hold' or 'set_zero'; else ''.")
+      .def_property_readonly(
+          "frame", [](const PortDescription& self) { return self.frames.frame; },
+          "That its values are in; '': not declared.")
+      .def_property_readonly(
+          "child_frame", [](const PortDescription& self) { return self.frames.child_frame; },
+          "Whose pose its values are; '': not declared.");
   py::class_<PropertyDescription>(module, "PropertyDescription")
       .def_readonly("name", &PropertyDescription::name)
       .def_readonly("type", &PropertyDescription::type, "'bool', 'int', 'float', 'str'.")
@@ -267,11 +276,17 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("longest_hold_ns", &ResourceDescription::longest_hold_ns,
                     "For how long a user holds its lock; 0: not declared.")
       .def_readonly("refused_values", &ResourceDescription::refused_values,
-                    "Values with a sequence that had more elements than the capacity.")
+                    "Values in another frame, or with a sequence that had more elements than the capacity.")
       .def_readonly("why_refused_value", &ResourceDescription::why_refused_value,
                     "The last of them, in words.")
       .def_readonly("memory_bytes", &ResourceDescription::memory_bytes,
-                    "What all values take that it has room for; 0: not known.");
+                    "What all values take that it has room for; 0: not known.")
+      .def_property_readonly(
+          "frame", [](const ResourceDescription& self) { return self.frames.frame; },
+          "That its values are in; '': not declared.")
+      .def_property_readonly(
+          "child_frame", [](const ResourceDescription& self) { return self.frames.child_frame; },
+          "Whose pose its values are; '': not declared.");
   using E = ExecutionTimeDescription;
   py::class_<E>(module, "ExecutionTimeDescription",
                 "How long an execution state took since its machine was configured.")

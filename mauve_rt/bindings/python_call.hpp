@@ -80,6 +80,7 @@ class ShellView {
 
   ReadMessage read(const std::string& name) const;
   bool write(const std::string& name, const py::bytes& data) const;
+  std::pair<std::string, std::string> frames(const std::string& name) const;
   py::object call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const;
   py::bytes request(const std::string& name, const py::bytes& data) const;
   void raise_event(const std::string& name) const;

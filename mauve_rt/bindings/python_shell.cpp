@@ -41,15 +41,18 @@ class ShellBuilder {
   ShellBuilder(PythonShell& shell, const PluginRegistry& registry) : shell_(shell), registry_(registry) {}
 
   void read_port(const std::string& name, const std::string& type, const std::optional<py::bytes>& zero,
-                 bool optional) {
+                 bool optional, const std::string& frame, const std::string& child_frame) {
     data_port(PortKind::read, name, type, {}, zero, optional);
+    shell_.find_port(name)->declare_frames({.frame = frame, .child_frame = child_frame});
   }
   void write_port(const std::string& name, const std::string& type, const std::optional<py::bytes>& zero,
-                  const std::string& on_commit, const std::string& on_stop, bool optional) {
+                  const std::string& on_commit, const std::string& on_stop, bool optional,
+                  const std::string& frame, const std::string& child_frame) {
     data_port(
         PortKind::write, name, type,
         {.on_commit = output_policy(on_commit, "on_commit"), .on_stop = output_policy(on_stop, "on_stop")},
         zero, optional);
+    shell_.find_port(name)->declare_frames({.frame = frame, .child_frame = child_frame});
   }
   void call_port(const std::string& name, const std::string& type) {
     shell_.add_port(std::make_unique<PythonCallPort>(name, type));
@@ -153,6 +156,15 @@ bool ShellView::write(const std::string& name, const py::bytes& data) const {
   return port.write_serialized(as_bytes_view(message));
 }
 
+std::pair<std::string, std::string> ShellView::frames(const std::string& name) const {
+  const PortBase& port = require_port(name, PortKind::write);
+  const ServiceBase* const service = port.service();
+  const Resource* const resource = service == nullptr ? nullptr : service->resource();
+  const Frames* const frames = resource == nullptr ? nullptr : resource->frame_guard().expected();
+  return frames == nullptr ? std::pair<std::string, std::string>()
+                           : std::pair(frames->frame, frames->child_frame);
+}
+
 py::object ShellView::call(const std::string& name, const py::args& args, const py::kwargs& kwargs) const {
   auto* port = dynamic_cast<PythonCallPort*>(&require_port(name, PortKind::call));
   if (port == nullptr) throw py::type_error("call port '" + name + "' has a signature in C++");
@@ -225,6 +237,8 @@ Raises MauveError (not_configured) once the component is gone.)")
       .def("read", &ShellView::read, py::arg("port"),
            "(message, 0 none - 1 old - 2 new, writer's time in ns).")
       .def("write", &ShellView::write, py::arg("port"), py::arg("data"), "False when there was no room.")
+      .def("frames", &ShellView::frames, py::arg("port"),
+           "(frame, child_frame) that the resource of a write port expects; '' where nothing is declared.")
       .def("call", &ShellView::call, py::arg("port"), "Calls a service in Python.")
       .def("request", &ShellView::request, py::arg("port"), py::arg("data"),
            "Calls a service in C++; the response.")
@@ -244,9 +258,10 @@ Raises MauveError (not_configured) once the component is gone.)")
       module, "ShellBuilder",
       "Takes the declarations of a shell written in Python. `zero`: the message's default, serialized.")
       .def("read_port", &ShellBuilder::read_port, py::arg("name"), py::arg("type"), py::arg("zero"),
-           py::arg("optional") = false)
+           py::arg("optional") = false, py::arg("frame") = "", py::arg("child_frame") = "")
       .def("write_port", &ShellBuilder::write_port, py::arg("name"), py::arg("type"), py::arg("zero"),
-           py::arg("on_commit"), py::arg("on_stop"), py::arg("optional") = false)
+           py::arg("on_commit"), py::arg("on_stop"), py::arg("optional") = false, py::arg("frame") = "",
+           py::arg("child_frame") = "")
       .def("call_port", &ShellBuilder::call_port, py::arg("name"), py::arg("type"))
       .def("request_port", &ShellBuilder::request_port, py::arg("name"), py::arg("type"))
       .def("event_port", &ShellBuilder::event_port, py::arg("name"), py::arg("optional") = false)

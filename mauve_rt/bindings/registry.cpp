@@ -13,13 +13,15 @@ struct DataResource {
   std::string type;
   ResourceParameters parameters;
   std::optional<Message> zero;  // none: it cannot be serialized
+  int frame_ids{0};             // as of SerializedOptions
 };
 
 std::unique_ptr<Resource> make_data_resource(const DataResource& data, const PluginRegistry& registry) {
   const std::vector<std::string> types = registry.names("type");
   if (data.zero && !std::binary_search(types.begin(), types.end(), data.type)) {
     const ResourceParameters all = registry.checked_parameters(data.kind, data.parameters);
-    return make_serialized_resource(data.kind, {.type = data.type, .zero = *data.zero, .parameters = all});
+    return make_serialized_resource(
+        data.kind, {.type = data.type, .zero = *data.zero, .parameters = all, .frame_ids = data.frame_ids});
   }
   return registry.make_resource(data.kind, data.type, data.parameters);
 }
@@ -148,19 +150,25 @@ void bind_registry(py::module_& module) {
       .def_readonly("name", &PartFactory::name);
   py::class_<DataResource>(
       module, "DataResource",
-      "A resource of a data type. `zero`: the message's default, serialized; None when it is no message.")
+      R"(A resource of a data type. `zero`: the message's default, serialized; None when it is no message.
+
+`frame_ids`: 1 if the message begins with a header, 2 if child_frame_id follows the header; else 0.)")
       .def(py::init([](const std::string& kind, const std::string& type,
                        const Typed<"dict[str, bool | int | float | str]">& parameters,
-                       const std::optional<py::bytes>& zero) {
-             DataResource made{
-                 .kind = kind, .type = type, .parameters = parameters_of(py::dict(parameters)), .zero = {}};
+                       const std::optional<py::bytes>& zero, int frame_ids) {
+             DataResource made{.kind = kind,
+                               .type = type,
+                               .parameters = parameters_of(py::dict(parameters)),
+                               .zero = {},
+                               .frame_ids = frame_ids};
              if (zero) {
                const auto bytes = std::as_bytes(std::span(std::string_view(*zero)));
                made.zero.emplace(bytes.begin(), bytes.end());
              }
              return made;
            }),
-           py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zero"));
+           py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zero"),
+           py::arg("frame_ids") = 0);
   py::class_<PluginGeneration, std::shared_ptr<PluginGeneration>>(
       module, "PluginGeneration",
       "Entries of a registry that are not in force: after begin_generation() those of before.")

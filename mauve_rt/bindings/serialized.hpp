@@ -36,6 +36,7 @@ struct SerializedOptions {
   std::string type;
   Message zero;                   // the message with every field at its default
   ResourceParameters parameters;  // all of the kind, checked
+  int frame_ids{0};               // that its messages begin with: header.frame_id, and then child_frame_id
 };
 
 /// As ReadPort<T> and WritePort<T>.

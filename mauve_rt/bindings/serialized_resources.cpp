@@ -64,6 +64,8 @@ class SerializedResource : public Resource {
     if (message.size() < kCdrHeader.size()) return found + ", which are no message";
     if (message.size() > max_bytes_)
       return found + ", more than the " + std::to_string(max_bytes_) + " declared";
+    const std::string of_frame = frame_guard().why_refused(ids_of(message));
+    if (!of_frame.empty()) return of_frame;
     return "the " + kind() + " was full";
   }
 
@@ -79,7 +81,7 @@ class SerializedResource : public Resource {
     return take_out(message, time_ns, seen);
   }
   bool write(std::span<const std::byte> message, time_ns_t time_ns) noexcept {
-    if (message.size() > max_bytes_) return false;
+    if (message.size() > max_bytes_ || !frame_guard().admits(ids_of(message))) return false;
     {
       const std::lock_guard lock(mutex_);
       if (!floor_.admits(time_ns)) return true;
@@ -142,6 +144,11 @@ class SerializedResource : public Resource {
    private:
     SerializedResource& owner_;
   };
+
+  FrameIds ids_of(std::span<const std::byte> message) const noexcept {
+    return options_.frame_ids == 0 ? FrameIds{}
+                                   : mauve::frame_ids(message.data(), message.size(), options_.frame_ids > 1);
+  }
 
   const SerializedOptions options_;
   const std::size_t max_bytes_;  // of one message

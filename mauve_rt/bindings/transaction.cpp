@@ -10,12 +10,16 @@ using Self = PyTransaction&;
 PyTransaction& add_component(Self self, const std::string& name, const AnyShell& shell, const AnyCore& core,
                              const AnyFsm& fsm, const std::map<std::string, PropertyValue>& properties,
                              const std::vector<std::string>& alternatives, const std::string& fallback,
-                             bool reconfigurable, const py::kwargs& settings) {
-  const ComponentParts rest{.settings = task_settings(name, settings),
-                            .properties = properties,
-                            .alternatives = alternatives,
-                            .fallback = fallback,
-                            .reconfigurable = reconfigurable};
+                             bool reconfigurable,
+                             const std::map<std::string, std::pair<std::string, std::string>>& frames,
+                             const py::kwargs& settings) {
+  ComponentParts rest{.settings = task_settings(name, settings),
+                      .properties = properties,
+                      .alternatives = alternatives,
+                      .fallback = fallback,
+                      .reconfigurable = reconfigurable};
+  for (const auto& [port, names] : frames)
+    rest.frames.emplace(port, Frames{.frame = names.first, .child_frame = names.second});
   return self.add([=](Transaction& transaction, const PluginRegistry& registry) {
     transaction.add_component(name,
                               Parts{.shell = make_shell(shell, registry),
@@ -122,26 +126,29 @@ void bind_wiring(py::class_<PyTransaction>& transaction) {
       .def(
           "add_resource",
           [](Self self, const std::string& name, const AnyResource& resource, const std::string& topic,
-             time_ns_t longest_hold_ns) -> Self {
+             time_ns_t longest_hold_ns, const std::string& frame, const std::string& child_frame) -> Self {
             const TopicBinding binding = topic_binding(topic);
             return self.add([=](Steps steps, Registry registry) {
-              steps.add_resource(name, make_resource(resource, registry), binding, longest_hold_ns);
+              steps.add_resource(name, make_resource(resource, registry), binding, longest_hold_ns,
+                                 {.frame = frame, .child_frame = child_frame});
             });
           },
           py::arg("name"), py::arg("resource"), py::kw_only(), py::arg("topic") = "",
-          py::arg("longest_hold_ns") = 0)
+          py::arg("longest_hold_ns") = 0, py::arg("frame") = "", py::arg("child_frame") = "")
       .def(
           "add_resource",
           [](Self self, const std::string& name, const std::string& kind, const std::string& type,
-             const std::string& topic, time_ns_t longest_hold_ns, const py::kwargs& keywords) -> Self {
+             const std::string& topic, time_ns_t longest_hold_ns, const std::string& frame,
+             const std::string& child_frame, const py::kwargs& keywords) -> Self {
             const TopicBinding binding = topic_binding(topic);
             const ResourceParameters parameters = parameters_of(keywords);
             return self.add([=](Steps steps, Registry) {
-              steps.add_resource(name, kind, type, parameters, binding, longest_hold_ns);
+              steps.add_resource(name, kind, type, parameters, binding, longest_hold_ns,
+                                 {.frame = frame, .child_frame = child_frame});
             });
           },
           py::arg("name"), py::kw_only(), py::arg("kind"), py::arg("type") = "", py::arg("topic") = "",
-          py::arg("longest_hold_ns") = 0,
+          py::arg("longest_hold_ns") = 0, py::arg("frame") = "", py::arg("child_frame") = "",
           "As Architecture.add_resource; `topic`: 'publish', 'subscribe' (as its methods) or ''.")
       .def("remove_resource", collected(&Transaction::remove_resource), py::arg("name"),
            "Refused while a port is connected to it.")
@@ -212,7 +219,11 @@ Parts are classes or registered names. Each step returns the transaction.)");
       .def("add_component", &add_component, py::arg("name"), py::arg("shell"), py::arg("core"),
            py::arg("fsm"), py::kw_only(), py::arg("properties") = std::map<std::string, PropertyValue>{},
            py::arg("alternatives") = std::vector<std::string>{}, py::arg("fallback") = "",
-           py::arg("reconfigurable") = true, "It arrives STOPPED; a start step starts it.");
+           py::arg("reconfigurable") = true,
+           py::arg("frames") = std::map<std::string, std::pair<std::string, std::string>>{},
+           R"(It arrives STOPPED; a start step starts it.
+
+`frames`: (frame, child_frame) of ports by name, in addition to those that the shell declares.)");
   bind_replacements(transaction);
   bind_wiring(transaction);
 }

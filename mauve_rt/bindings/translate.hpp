@@ -102,6 +102,7 @@ struct PortDescription {
   std::vector<std::byte> stop_message{};  // of a component's
   std::string on_commit{};                // of a shell's write port: "hold" or "set_zero"
   std::string on_stop{};
+  Frames frames{};
 };
 std::vector<PortDescription> describe_ports(const Shell& shell);
 
@@ -135,6 +136,7 @@ struct ResourceDescription {
   std::uint64_t refused_values{0};
   std::string why_refused_value{};
   std::size_t memory_bytes{0};
+  Frames frames{};
 };
 ResourceDescription describe_resource(const Resource& resource);
 

@@ -149,12 +149,14 @@ def _drawing(
     resources = {**model.resources, **(more or {})}
     present = [one.name for one in described.resources] or list(model.resources)
     return architecture_drawing(
-        title, described.components, [_resource(name, resources[name], model.namespace) for name in present]
+        title, described.components, [_resource(name, resources[name], model) for name in present]
     )
 
 
-def _resource(name: str, one: ResourceModel, namespace: str) -> Any:
-    found = SimpleNamespace(name=name, kind=one.kind, type=one.type)
+def _resource(name: str, one: ResourceModel, model: ArchitectureModel) -> Any:
+    namespace = model.namespace
+    frame, child_frame = model.frames_of(one, ("resources", name))
+    found = SimpleNamespace(name=name, kind=one.kind, type=one.type, frame=frame, child_frame=child_frame)
     if one.topic is not None:
         side = "publishes" if one.topic.direction == "publish" else "subscribes"
         setattr(found, side, full_name(one.topic.name, namespace))

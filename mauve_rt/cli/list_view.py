@@ -12,7 +12,7 @@ from rich.table import Table
 from mauve_rt.cli.views import console
 from mauve_rt.control.state_age import in_words
 from mauve_rt.counts import counted, duration
-from mauve_rt.graph.components import ROS_SIDES
+from mauve_rt.graph.components import ROS_SIDES, frames_text
 
 # As mauve_msgs/msg/ComponentInfo.
 STATES = {0: "UNCONFIGURED", 1: "STOPPED", 2: "RUNNING", 4: "STOPPING", 5: "FAULTED"}
@@ -170,6 +170,8 @@ def _connections(reply: Any) -> Table:
             service = f"{port.resource}.{port.service}" if port.resource else "[yellow]nothing[/]"
             if service in locked:
                 service += " [dim](lock)[/]"
+            if frames := frames_text(port):
+                service += f"\n[dim]{escape(frames)}[/]"
             table.add_row(f"{component.name}.{port.name}", service, on_ros.get(port.resource, ""))
             connected.add(port.resource)
     for name, names in _lonely(on_ros, connected).items():
@@ -193,7 +195,10 @@ def _lonely(on_ros: Mapping[str, str], connected: set[str]) -> dict[str, str]:
 def _ros_names(resource: Any) -> str:
     names = [(side, getattr(resource, side)) for side in ROS_SIDES]
     names += [("mirrors", topic) for topic in resource.mirrors]
-    return "\n".join(f"[dim]{side}[/] {name}" for side, name in names if name)
+    lines = [f"[dim]{side}[/] {name}" for side, name in names if name]
+    if frames := frames_text(resource):
+        lines.append(f"[dim]{escape(frames)}[/]")
+    return "\n".join(lines)
 
 
 def _table(*folding: str) -> Table:

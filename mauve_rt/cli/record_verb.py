@@ -1,4 +1,4 @@
-"""`mauve record`: start or stop a recording of an executor."""
+"""`mauve record`: start or stop a recording of an executor, or write a snapshot of its last seconds."""
 
 import argparse
 
@@ -10,12 +10,12 @@ from mauve_rt.trace.bag.recorded import COMPRESSIONS
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `mauve record`."""
-    actions = parser.add_subparsers(title="actions", metavar="start|stop", required=True)
+    actions = parser.add_subparsers(title="actions", metavar="start|snapshot|stop", required=True)
     start = actions.add_parser("start", help="start a recording into a new bag")
+    snapshot = actions.add_parser("snapshot", help="write the last seconds of a recording as a bag")
     stop = actions.add_parser("stop", help="end the recording and complete the bag")
-    start.set_defaults(starts=True)
-    stop.set_defaults(starts=False)
-    for action in (start, stop):
+    for action, send in ((start, _start), (snapshot, _snapshot), (stop, _stop)):
+        action.set_defaults(send=send)
         add_executor_and_json(action)
     start.add_argument(
         "bag",
@@ -73,16 +73,40 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default="none",
         help="compression of the chunks of the files (default: none)",
     )
-    for action in (start, stop):
+    start.add_argument(
+        "--snapshot",
+        type=float,
+        default=0.0,
+        metavar="SECONDS",
+        help="keep the last SECONDS in memory instead of writing a bag; `mauve record snapshot` writes them. "
+        "BAG is then the folder in which snapshots are created",
+    )
+    start.add_argument(
+        "--snapshot-mb",
+        type=float,
+        default=0.0,
+        metavar="MB",
+        help="largest memory of --snapshot; beyond it the oldest data is dropped sooner (default: 268)",
+    )
+    snapshot.add_argument(
+        "--bag",
+        default="",
+        metavar="DIR",
+        help="folder of the snapshot, below the executor's parameter `bags` (default: named by the time)",
+    )
+    for action in (start, snapshot, stop):
         add_request_fields(action)
 
 
 def main(args: argparse.Namespace) -> int:
     """Send the request."""
-    from mauve_msgs.srv import StartRecording, StopRecording  # noqa: PLC0415
+    status: int = args.send(args)
+    return status
 
-    if not args.starts:
-        return send_request(args, StopRecording, "stop_recording")
+
+def _start(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import StartRecording  # noqa: PLC0415
+
     return send_request(
         args,
         StartRecording,
@@ -95,4 +119,18 @@ def main(args: argparse.Namespace) -> int:
         split_bytes=max(round(args.split_mb * 1e6), 0),
         compression=args.compression,
         max_size_bytes=max(round(args.max_size_mb * 1e6), 0),
+        snapshot_s=args.snapshot,
+        snapshot_bytes=max(round(args.snapshot_mb * 1e6), 0),
     )
+
+
+def _snapshot(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import WriteSnapshot  # noqa: PLC0415
+
+    return send_request(args, WriteSnapshot, "write_snapshot", bag=args.bag)
+
+
+def _stop(args: argparse.Namespace) -> int:
+    from mauve_msgs.srv import StopRecording  # noqa: PLC0415
+
+    return send_request(args, StopRecording, "stop_recording")

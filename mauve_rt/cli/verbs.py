@@ -444,7 +444,7 @@ VERBS = (
     Verb("watch", "show a live table of executors", watch_verb.add_arguments, watch_verb.main),
     Verb(
         "record",
-        "start or stop a recording of an executor",
+        "start or stop a recording of an executor, or write a snapshot of its last seconds",
         record_verb.add_arguments,
         record_verb.main,
     ),

@@ -8,7 +8,7 @@ from mauve_rt.control.runtime import Runtime
 from mauve_rt.file_schema.words import did_you_mean, shown
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import LONGEST_IDLE_S, Step
-from mauve_rt.trace.bag.recorded import COMPRESSIONS, FILES_OF_A_BAG, Split
+from mauve_rt.trace.bag.recorded import COMPRESSIONS, FILES_OF_A_BAG, MIN_WINDOW_BYTES, Split
 
 MAX_TIMEOUT_S = 10.0
 MAX_TEXT = 1000
@@ -18,6 +18,7 @@ MAX_TOPICS = 100
 MAX_TARGETS = 100
 MIN_SPLIT_S, MAX_SPLIT_S = 1.0, 1e6
 MIN_SPLIT_BYTES = 100_000
+MIN_SNAPSHOT_S = 1.0
 
 
 def _check_seconds(name: str, found_s: float, most_s: float) -> None:
@@ -119,6 +120,7 @@ def _check_recording(order: RecordingOrder) -> None:
     if order.split_bytes != 0 and order.split_bytes < MIN_SPLIT_BYTES:
         text = f"bad split_bytes: expected 0 (any size) or at least {MIN_SPLIT_BYTES:,}"
         raise RefusalError(Code.INVALID, f"{text}, found {order.split_bytes:,}")
+    _check_window(order)
     if order.compression not in ("", *COMPRESSIONS):
         text = f"bad compression: expected {' or '.join(COMPRESSIONS)}, found {shown(order.compression)}"
         raise RefusalError(Code.INVALID, text)
@@ -140,3 +142,15 @@ def check_state(step: Step, component: ComponentDescription) -> None:
         raise RefusalError(Code.NOT_RUNNING, f"component '{component.name}' is already stopped")
     if step.kind == "start" and component.state == "RUNNING":
         raise RefusalError(Code.ALREADY_RUNNING, f"component '{component.name}' is already running")
+
+
+def _check_window(order: RecordingOrder) -> None:
+    if order.snapshot_s != 0 and not MIN_SNAPSHOT_S <= order.snapshot_s <= MAX_SPLIT_S:
+        text = f"bad snapshot_s: expected 0 (record into a bag) or {MIN_SNAPSHOT_S:g} to {MAX_SPLIT_S:g} s"
+        raise RefusalError(Code.INVALID, f"{text}, found {order.snapshot_s:g}")
+    if order.snapshot_bytes != 0 and not order.snapshot_s:
+        text = "bad snapshot_bytes: it limits the memory of snapshot_s; give snapshot_s, too"
+        raise RefusalError(Code.INVALID, text)
+    if order.snapshot_bytes != 0 and order.snapshot_bytes < MIN_WINDOW_BYTES:
+        text = f"bad snapshot_bytes: expected 0 (the default) or at least {MIN_WINDOW_BYTES:,}"
+        raise RefusalError(Code.INVALID, f"{text}, found {order.snapshot_bytes:,}")

@@ -5,7 +5,7 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 from mauve_msgs.msg import ReplyCode
 from mauve_rt._kernel import ERROR_REPLIES, NOT_MEASURED
@@ -69,9 +69,9 @@ BY_RULE = "rule "  # how the author begins of what a rule does
 
 @dataclass(frozen=True, kw_only=True)
 class RecordingOrder:
-    """Start to record, or stop; as mauve_msgs/srv/StartRecording."""
+    """Start to record, stop, or write a snapshot; as mauve_msgs/srv/StartRecording and WriteSnapshot."""
 
-    start: bool
+    kind: Literal["start", "stop", "snapshot"]
     bag: str = ""
     topics: tuple[str, ...] = ()
     topic_regexes: tuple[str, ...] = ()
@@ -80,10 +80,12 @@ class RecordingOrder:
     split_bytes: int = 0
     max_size_bytes: int = 0  # 0: no limit
     compression: str = ""  # empty: none
+    snapshot_s: float = 0.0  # 0: into a bag, not into memory
+    snapshot_bytes: int = 0  # 0: the default
 
     def __str__(self) -> str:
-        words = "stop_recording"
-        if self.start:
+        words = "stop_recording" if self.kind == "stop" else f"write_snapshot {self.bag}"
+        if self.kind == "start":
             words = " ".join(("start_recording", self.bag, *self.topics, *self.topic_regexes, *self.values))
         return cut(words.strip(), _LONGEST_WORDS)
 

@@ -62,6 +62,13 @@ def takes_values(port: Any) -> bool:
     return port.kind in ("read", "event") or port.service.startswith(("read", "get"))
 
 
+def frames_text(described: Any) -> str:
+    """`in map`, `in odom, of base`; empty: a port or a resource declares no frame."""
+    frame, child_frame = (getattr(described, key, "") for key in ("frame", "child_frame"))
+    parts = [f"in {frame}" if frame else "", f"of {child_frame}" if child_frame else ""]
+    return ", ".join(filter(None, parts))
+
+
 def cpus_text(cpus: Iterable[int] | None) -> str:
     """`CPU 0, 2`, or `any CPU`: the frame in which components of the same CPUs stand; empty: not known."""
     if cpus is None:
@@ -113,6 +120,8 @@ def _resource(name: str, described: Any, components: Iterable[Any]) -> Node:
     names = [(side, getattr(described, side, "")) for side in ROS_SIDES]
     lines = [name.rpartition("/")[2], *(f"{side} {ros_name}" for side, ros_name in names if ros_name)]
     details = {"kind": described.kind, "type": described.type} if described is not None else {}
+    if frames := frames_text(described):
+        lines.append(frames)
     return Node(
         key=resource_key(name),
         kind="resource",
@@ -128,10 +137,11 @@ def _edge(component: Any, port: Any) -> Edge:
     ends = [component_key(component.name), resource_key(port.resource)]
     start, end = reversed(ends) if takes_values(port) else ends
     tip = f"{component.name}.{port.name} ({port.kind}), {port.resource}.{port.service}"
+    lines = [port.name] if port.name != port.resource.rpartition("/")[2] else []
     return Edge(
         start=start,
         end=end,
         kind="data",
-        lines=(port.name,) if port.name != port.resource.rpartition("/")[2] else (),
+        lines=tuple(filter(None, [*lines, frames_text(port)])),
         tip=f"{tip}, {port.type}" if port.type else tip,
     )

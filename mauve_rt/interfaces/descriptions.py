@@ -164,6 +164,8 @@ def resource_infos(runtime: Runtime, bindings: Mapping[str, Mapping[str, Any]]) 
             author=authors.get(resource.name, {}).get("", ""),
             wait_free=[service.name for service in resource.services if service.is_wait_free],
             memory_bytes=resource.memory_bytes,
+            frame=resource.frame,
+            child_frame=resource.child_frame,
             **bindings.get(resource.name, {}),
         )
         for resource in runtime.described_resources()
@@ -361,6 +363,8 @@ def _port_info(port: PortDescription) -> Any:
         service=port.service,
         longest_hold_ns=port.longest_hold_ns,
         wait_free=port.wait_free,
+        frame=port.frame,
+        child_frame=port.child_frame,
     )
 
 

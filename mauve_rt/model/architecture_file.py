@@ -11,8 +11,8 @@ from mauve_rt.file_schema.schema_errors import owner, read_content
 from mauve_rt.file_schema.words import did_you_mean, listed
 from mauve_rt.file_schema.yaml_file import Location, YamlFile
 from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
-from mauve_rt.model.schema import ComponentModel, FileModel, PropertyValue, ResourceModel
-from mauve_rt.model.substitution import substituted_property
+from mauve_rt.model.schema import ComponentModel, FileModel, FramesModel, PropertyValue, ResourceModel
+from mauve_rt.model.substitution import substituted_frame, substituted_property
 
 if TYPE_CHECKING:
     from mauve_rt.model.modelled_parts import ModelledParts
@@ -81,6 +81,33 @@ class ArchitectureModel:
             if owning == component:
                 values[name] = self._substituted(component, name, value, Path.cwd())
         return values
+
+    def frames(self, component: str) -> dict[str, tuple[str, str]]:
+        """(frame, child_frame) of the ports of a component as the file declares them; empty: it does not.
+
+        Raises:
+            ArchitectureFileError: a place in a name is empty.
+        """
+        return {
+            port: self.frames_of(declared, ("components", component, "frames", port))
+            for port, declared in self.components[component].frames.items()
+        }
+
+    def resource_frames(self, resource: str) -> tuple[str, str]:
+        """(frame, child_frame) of a resource, as frames()."""
+        return self.frames_of(self.resources[resource], ("resources", resource))
+
+    def frames_of(self, declared: FramesModel | ResourceModel, place: Location) -> tuple[str, str]:
+        """(frame, child_frame) of a declaration at that place, as frames()."""
+        try:
+            frame, child_frame = (
+                substituted_frame(name, self) if name else ""
+                for name in (declared.frame, declared.child_frame)
+            )
+        except LookupError as error:
+            problem = self.problem(place, "bad frame", found=str(error.args[0]))
+            raise ArchitectureFileError(self.path, [problem]) from None
+        return frame, child_frame
 
     def property_place(self, component: str, name: str) -> Location:
         """Where a property of a component is set."""

@@ -119,6 +119,7 @@ def add_component_step(
         **_settings(component, loader),
         properties=model.properties(name),
         fallback=component.fallback or "",
+        frames=model.frames(name),
     )
 
 
@@ -128,11 +129,14 @@ def add_resource_step(
     """Let a transaction add a resource that `model` describes."""
     resource = model.resources[name]
     direction = resource.topic.direction if resource.topic is not None else ""
+    frame, child_frame = model.resource_frames(name)
     transaction.add_resource(
         name,
         **resource_part(resource, registry),
         topic=direction,
         longest_hold_ns=resource.longest_hold_ns or 0,
+        frame=frame,
+        child_frame=child_frame,
     )
 
 

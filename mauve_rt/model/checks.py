@@ -44,6 +44,7 @@ class Checks:
         for component in self._model.components:
             found += self._component(component)
             found += self._properties(component)
+            found += self._frames(component)
         for resource in self._model.resources:
             found += self._resource(resource)
         for connection in self._model.connections:
@@ -159,9 +160,44 @@ class Checks:
             elif facts := property_mismatch(known[key], value):
                 yield self._model.problem(place, f"bad {self._model.property_words(name, key)}", **facts)
 
+    def _frames(self, name: str) -> Iterator[Problem]:
+        """Frames of ports that there are not, or that the code of the shell declares otherwise."""
+        shell = self._shells.get(name)
+        if shell is None:
+            return
+        try:
+            frames = self._model.frames(name)
+        except ArchitectureFileError as error:
+            yield from error.problems
+            return
+        ports = {port.name: port for port in shell.ports if port.kind in ("read", "write")}
+        for key, declared in frames.items():
+            place: Location = ("components", name, "frames", key)
+            if key not in ports:
+                what = f"component '{name}' has no port '{key}' that reads or writes values"
+                remedy = did_you_mean(key, ports)
+                yield self._model.key_problem(place, what, remedy=remedy, code="unknown_port")
+                continue
+            own = ports[key].frame, ports[key].child_frame
+            for word, found, expected in zip(("frame", "child_frame"), declared, own, strict=True):
+                if found and expected and found != expected:
+                    yield self._model.problem(
+                        place,
+                        f"the shell of '{name}' declares another {word} for port '{key}'",
+                        expected=expected,
+                        found=found,
+                        remedy="remove it from the file, or correct the code of the shell",
+                        code="frame_mismatch",
+                    )
+
     def _resource(self, name: str) -> Iterator[Problem]:
         resource = self._model.resources[name]
         place: Location = ("resources", name)
+        try:
+            self._model.resource_frames(name)
+        except ArchitectureFileError as error:
+            yield from error.problems
+            return
         try:
             if resource.kind not in given_kinds():
                 wrong = [*self._plugin("resource", resource.kind, (*place, "kind"))]

@@ -136,6 +136,7 @@ class _Reading:
             return {"call": self._call(port.type, f"port {_last(shell)}.{port.name}")}
         policies = {"on_commit": port.on_commit, "on_stop": port.on_stop} if port.kind == "write" else {}
         given = {key: policy for key, policy in policies.items() if policy != _DEFAULT_POLICIES[key]}
+        given |= {key: name for key in ("frame", "child_frame") if (name := getattr(port, key))}
         return {port.kind: self._own(port.type), **given, **optional}
 
     def _call(self, type_name: str, of: str) -> str | Mapped:

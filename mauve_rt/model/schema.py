@@ -31,6 +31,7 @@ from collections.abc import Mapping
 from typing import Any, Literal, Self
 
 from mauve_rt._kernel import TASK_SETTINGS
+from mauve_rt.file_schema.frame_names import FRAME_OF_ROBOT
 from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, given, has, reference, when
 from mauve_rt.file_schema.kinds import (
     Choice,
@@ -392,6 +393,14 @@ class ResourceModel(Section):
     service: ServiceModel | None = setting(
         Part(ServiceModel), "the ROS service that the resource calls or offers", default=None
     )
+    frame: str | None = setting(
+        FRAME_OF_ROBOT,
+        "the frame that the values are in: a port or a message in another frame is refused",
+        default=None,
+    )
+    child_frame: str | None = setting(
+        FRAME_OF_ROBOT, "of poses and transforms: the frame whose pose they are", default=None
+    )
     longest_hold_ns: int | None = setting(
         Whole(1, _LONGEST_NS),
         "the longest time for which one component holds its lock: the timing analysis takes it, nothing "
@@ -485,6 +494,40 @@ class StateModel(Section):
         return {"anyOf": [given(key) for key in cls.settings]}
 
 
+class FramesModel(Section):
+    """The frames of a port's values; at least one of them."""
+
+    frame: str | None = setting(FRAME_OF_ROBOT, "the frame that the values are in", default=None)
+    child_frame: str | None = setting(
+        FRAME_OF_ROBOT, "of poses and transforms: the frame whose pose they are", default=None
+    )
+
+    def misfit(self) -> Fault | None:
+        """One of them at least."""
+        if self.frame is None and self.child_frame is None:
+            return Fault((), "form", limit="frame or child_frame or both of them")
+        return None
+
+    @classmethod
+    def json_rules(cls, definitions: Definitions) -> JsonSchema:  # noqa: ARG003
+        """As misfit()."""
+        return {"anyOf": [given(key) for key in cls.settings]}
+
+
+class _Frames(Part):
+    """A FramesModel, or the frame alone."""
+
+    def read(self, value: Any, place: Location, faults: Faults) -> Any:
+        if isinstance(value, str) and not FRAME_OF_ROBOT.fits(value):
+            faults.append(Fault(place, "form", limit=FRAME_OF_ROBOT.expected, found=value))
+            return value
+        return super().read({"frame": value} if isinstance(value, str) else value, place, faults)
+
+    def json_schema(self, definitions: Definitions) -> JsonSchema:
+        """As Kind."""
+        return {"anyOf": [FRAME_OF_ROBOT.json_schema(definitions), super().json_schema(definitions)]}
+
+
 class ComponentModel(Section):
     """A component and the thread it runs on."""
 
@@ -537,6 +580,11 @@ class ComponentModel(Section):
     properties: dict[str, PropertyValue] = setting(
         TableOf(Scalar()),
         "values of properties by name; without a name the default of its shell, core or fsm",
+        default={},
+    )
+    frames: dict[str, FramesModel] = setting(
+        TableOf(_Frames(FramesModel), names=IDENTIFIER),
+        "frames of the values of ports by name, in addition to those in the code of the shell",
         default={},
     )
     diagnostics: DiagnosticsModel = setting(

@@ -3,6 +3,7 @@
 - `$(share PACKAGE)` - the package's share folder, found through the ament index;
 - `$(namespace)` - the executor's namespace, `$(name)` - its last part;
 - `$(peers)` - the executor's peers, separated by commas;
+- a frame begins with no slash, also where it begins with `$(namespace)`;
 - a relative path in a text property named `map` or ending in `_file` is relative to the architecture file.
 """
 
@@ -37,6 +38,19 @@ def substituted_property(
     if text and (name == "map" or name.endswith("_file")):
         return str((folder / text).resolve())
     return text
+
+
+def substituted_frame(text: str, model: Surroundings) -> str:
+    """A frame with its places replaced.
+
+    Raises:
+        LookupError: nothing is left of it, in words.
+    """
+    frame = _PLACE.sub(lambda match: _replacement(match[1].split(), model), text).lstrip("/")
+    if not frame:
+        message = f"{text}, which is empty in namespace '{model.namespace}'"
+        raise LookupError(message)
+    return frame
 
 
 def _replacement(words: list[str], model: Surroundings) -> str:

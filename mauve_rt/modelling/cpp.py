@@ -74,6 +74,9 @@ class CppNames:
     def port(self, name: str, port: PortModel) -> str:
         """The declaration of a port."""
         optional = ".optional()" if port.optional else ""
+        if port.frame or port.child_frame:
+            frames = [port.frame or "", *([port.child_frame] if port.child_frame else [])]
+            optional += f".in_frame({', '.join(map(text, frames))})"
         if port.call is not None:
             return f"{self._call(name, port.call)};"
         if port.read_type is not None:

@@ -92,6 +92,8 @@ def _property(one: PropertyModel) -> str:
 
 def _port(model: PackageModel, one: PortModel) -> str:
     optional = ["optional=True"] if one.optional else []
+    frames = {"frame": one.frame, "child_frame": one.child_frame}
+    optional += [f"{key}={name!r}" for key, name in frames.items() if name]
     if one.event:
         return f"api.event_port({', '.join(optional)})"
     if one.call is not None:

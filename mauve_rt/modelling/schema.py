@@ -28,6 +28,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from mauve_rt.file_schema.frame_names import FRAME
 from mauve_rt.file_schema.json_schema import Definitions, JsonSchema, given, has, text_form, when
 from mauve_rt.file_schema.kinds import Choice, Fault, Faults, Flag, Kind, ListOf, Real, Scalar, TableOf, Text
 from mauve_rt.file_schema.section import Part, Section, setting
@@ -232,6 +233,10 @@ class PortModel(Section):
     )
     on_stop: str | None = setting(_OUTPUT, "what a write port has when its component stops", default=None)
     optional: bool = setting(Flag(), "it may stay unconnected; not of a call", default=False)
+    frame: str | None = setting(FRAME, "the frame that its values are in", default=None)
+    child_frame: str | None = setting(
+        FRAME, "of poses and transforms: the frame whose pose they are", default=None
+    )
     description: str = setting(_LINE, "what it is for", default="")
 
     def misfit(self) -> Fault | None:
@@ -244,6 +249,9 @@ class PortModel(Section):
         for name in ("on_commit", "on_stop"):
             if getattr(self, name) is not None and self.write is None:
                 return Fault((name,), "form", limit="nothing: only a write port has one")
+        for name in ("frame", "child_frame"):
+            if getattr(self, name) is not None and self.data_type is None:
+                return Fault((name,), "form", limit="nothing: only a port that reads or writes has one")
         return None
 
     @classmethod
@@ -251,6 +259,8 @@ class PortModel(Section):
         """As misfit()."""
         written = [when(given(key), given("write")) for key in ("on_commit", "on_stop")]
         call = when(given("call"), {"properties": {"optional": {"const": False}}})
+        data = {"anyOf": [given("read"), given("write")]}
+        written += [when(given(key), data) for key in ("frame", "child_frame")]
         kinds = [*map(given, ("read", "write", "call")), has("event", True)]
         return {"oneOf": kinds, "allOf": [*written, call]}
 

@@ -2,6 +2,7 @@
 
     class HoverShell(Shell):
         pose = read_port(Pose)
+        measured = read_port(PoseStamped, frame="map")    # connected to no resource in another frame
         target = write_port(Point, on_commit="hold", on_stop="set_zero")
         advice = read_port(Point, optional=True)    # all others are to be connected
         height = property(1.0, unit="m", minimum=0.0)
@@ -23,8 +24,17 @@ from mauve_rt.parts.ports import (
     WritePort,
 )
 from mauve_rt.parts.resources import service_type
+from mauve_rt.parts.transformed_ports import TransformedReadPort
 
-__all__ = ["call_port", "event_port", "property", "read_port", "request_port", "write_port"]
+__all__ = [
+    "call_port",
+    "event_port",
+    "property",
+    "read_port",
+    "request_port",
+    "transformed_read_port",
+    "write_port",
+]
 
 T = TypeVar("T")
 V = TypeVar("V", bound=bool | int | float | str)
@@ -32,9 +42,19 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def read_port(type: type[T] | str, default: T | None = None, *, optional: bool = False) -> ReadPort[T]:  # noqa: A002
-    """A port to read from; `default` is what it yields before anything was written, or unconnected."""
-    return ReadPort(type, default, optional=optional)
+def read_port(
+    type: type[T] | str,  # noqa: A002
+    default: T | None = None,
+    *,
+    optional: bool = False,
+    frame: str = "",
+    child_frame: str = "",
+) -> ReadPort[T]:
+    """A port to read from; `default` is what it yields before anything was written, or unconnected.
+
+    Its values are in `frame`; poses and transforms are those of `child_frame`.
+    """
+    return ReadPort(type, default, optional=optional, frame=frame, child_frame=child_frame)
 
 
 def write_port(
@@ -43,9 +63,21 @@ def write_port(
     on_commit: OutputPolicy = "hold",
     on_stop: OutputPolicy = "set_zero",
     optional: bool = False,
+    frame: str = "",
+    child_frame: str = "",
 ) -> WritePort[T]:
-    """A port to write to, and what the kernel writes while the component is replaced or does not run."""
-    return WritePort(type, on_commit=on_commit, on_stop=on_stop, optional=optional)
+    """A port to write to, and what the kernel writes while the component is replaced or does not run.
+
+    `frame`, `child_frame`: as of `read_port`.
+    """
+    return WritePort(
+        type,
+        on_commit=on_commit,
+        on_stop=on_stop,
+        optional=optional,
+        frame=frame,
+        child_frame=child_frame,
+    )
 
 
 @overload
@@ -55,6 +87,24 @@ def call_port(service: str) -> CallPort[..., Any]: ...
 def call_port(service: Callable[..., Any] | str) -> CallPort[..., Any]:
     """A port that calls a service of a resource in Python: the service's type, or the method that is one."""
     return CallPort(service if isinstance(service, str) else service_type(service))
+
+
+def transformed_read_port(
+    type: type[T] | str,  # noqa: A002
+    *,
+    to: str,
+    lookup: RequestPort,
+    frame: str = "",
+    latest: bool = False,
+    optional: bool = False,
+) -> TransformedReadPort[T]:
+    """A port to read from whose values are in its own frame, `to`.
+
+    `lookup`: the shell's `request_port(LookupTransform)`. `frame`: that of values without a
+    header, or with an empty frame_id. `latest`: by the latest transform, in the place of that at the time at
+    which the value was written.
+    """
+    return TransformedReadPort(type, to=to, lookup=lookup, frame=frame, latest=latest, optional=optional)
 
 
 def request_port(service: Any) -> RequestPort:

@@ -1,10 +1,21 @@
 """ROS messages as Python parts name them: by class or by type name; and their serialized form."""
 
+import copy
+from functools import cache
 from typing import Any
 
 from mauve_rt.parts.message_types import is_promised, message_class
 
-__all__ = ["deserialize", "message_class", "serialize", "service_name", "type_name", "zero"]
+__all__ = [
+    "deserialize",
+    "frame_ids",
+    "in_frames",
+    "message_class",
+    "serialize",
+    "service_name",
+    "type_name",
+    "zero",
+]
 
 
 _EMPTY = b"\0\1\0\0"  # CDR's header alone
@@ -42,6 +53,32 @@ def zero(name: str) -> bytes | None:
     if found is None:
         return _EMPTY if is_promised(name) else None
     return serialize(found())
+
+
+@cache
+def frame_ids(of_class: Any) -> int:
+    """How many frames a message begins with: 1 in its header, 2 with `child_frame_id` behind the header."""
+    if of_class is None:
+        return 0
+    fields = [*of_class.get_fields_and_field_types().items()]
+    if fields[:1] != [("header", "std_msgs/Header")]:
+        return 0
+    return 2 if fields[1:2] == [("child_frame_id", "string")] else 1
+
+
+def in_frames(message: Any, frame: str, child_frame: str) -> Any:
+    """The message, or a copy of it with the frames that it lacks."""
+    lacks_frame = bool(frame) and not message.header.frame_id
+    lacks_child = bool(child_frame) and frame_ids(message.__class__) > 1 and not message.child_frame_id
+    if not lacks_frame and not lacks_child:
+        return message
+    filled = copy.copy(message)
+    if lacks_frame:
+        filled.header = copy.copy(message.header)
+        filled.header.frame_id = frame
+    if lacks_child:
+        filled.child_frame_id = child_frame
+    return filled
 
 
 def serialize(message: Any) -> bytes:

@@ -81,10 +81,19 @@ class Member:
 
 
 class _DataPort(Member, Generic[T]):
-    def __init__(self, type: type[T] | str, *, optional: bool) -> None:  # noqa: A002 - the word of the field
+    def __init__(
+        self,
+        type: type[T] | str,  # noqa: A002 - the word of the field
+        *,
+        optional: bool,
+        frame: str,
+        child_frame: str,
+    ) -> None:
         super().__init__()
         self.type = messages.type_name(type)
         self.optional = optional
+        self.frame = frame
+        self.child_frame = child_frame
 
     @cached_property
     def message_class(self) -> Any:
@@ -110,13 +119,22 @@ class ReadPort(_DataPort[T]):
         default: T | None = None,
         *,
         optional: bool = False,
+        frame: str = "",
+        child_frame: str = "",
     ) -> None:
-        super().__init__(type, optional=optional)
+        super().__init__(type, optional=optional, frame=frame, child_frame=child_frame)
         self._default = default
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
-        builder.read_port(self.name, self.type, messages.zero(self.type), optional=self.optional)
+        builder.read_port(
+            self.name,
+            self.type,
+            messages.zero(self.type),
+            optional=self.optional,
+            frame=self.frame,
+            child_frame=self.child_frame,
+        )
 
     def read(self) -> Sample[T]:
         """The present value, its status and the writer's time."""
@@ -136,8 +154,10 @@ class WritePort(_DataPort[T]):
         on_commit: OutputPolicy = "hold",
         on_stop: OutputPolicy = "set_zero",
         optional: bool = False,
+        frame: str = "",
+        child_frame: str = "",
     ) -> None:
-        super().__init__(type, optional=optional)
+        super().__init__(type, optional=optional, frame=frame, child_frame=child_frame)
         self.on_commit = on_commit
         self.on_stop = on_stop
 
@@ -151,16 +171,22 @@ class WritePort(_DataPort[T]):
             on_commit=self.on_commit,
             on_stop=self.on_stop,
             optional=self.optional,
+            frame=self.frame,
+            child_frame=self.child_frame,
         )
 
     def write(self, value: T) -> bool:
-        """Write a ROS message; False when there was no room for it.
+        """Write a ROS message; False when there was no room for it, or it is in another frame.
+
+        A message without a frame gets the one that is declared; `value` stays as it is.
 
         Raises:
             TypeError: a message of another type.
         """
         if not isinstance(value, self.message_class):
             raise TypeError(f"port '{self.name}' takes {self.type}, not {type(value).__name__}")
+        if messages.frame_ids(self.message_class):
+            value = messages.in_frames(value, *self._shell.frames(self.name))
         return self._shell.write(self.name, messages.serialize(value))
 
 
@@ -191,7 +217,7 @@ class RequestPort(Member):
     def __init__(self, service: Any) -> None:
         super().__init__()
         self.type = messages.service_name(service)
-        self._service = service
+        self.service = service
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""
@@ -204,10 +230,10 @@ class RequestPort(Member):
             MauveError: not connected, or not answered.
             TypeError: a request of another type.
         """
-        if not isinstance(request, self._service.Request):
+        if not isinstance(request, self.service.Request):
             raise TypeError(f"port '{self.name}': expected {self.type}.Request, found {request!r}")
         data = self._shell.request(self.name, messages.serialize(request))
-        return messages.deserialize(data, self._service.Response)
+        return messages.deserialize(data, self.service.Response)
 
 
 class EventPort(Member):

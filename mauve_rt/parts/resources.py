@@ -168,7 +168,11 @@ class DataOfKind(AnyResource, Generic[T]):
     def __init__(self, kind: str, type: type[T] | str, **parameters: bool | float | str) -> None:  # noqa: A002
         name = messages.type_name(type)
         self._resource = DataResource(
-            kind=kind, type=name, parameters=parameters, zero=messages.zero(name) if name else None
+            kind=kind,
+            type=name,
+            parameters=parameters,
+            zero=messages.zero(name) if name else None,
+            frame_ids=messages.frame_ids(messages.message_class(name)) if name else 0,
         )
 
     def _instance_part(self) -> DataResource:

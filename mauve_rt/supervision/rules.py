@@ -17,6 +17,7 @@
         safety: false               # above all rules that are not, and above what persons put over rules
         latch: false                # it ends by `mauve rules reset` only
         whole: false                # it does nothing while another rule or a person has taken a part of it
+        snapshot: false             # when `do` begins, the executor writes the last seconds of its recording
 
 What may stand in `when`: see supervision/when.py. One file serves both: the executor runs the rules that are
 `in: executor`; its supervisor runs the others, and those too where the executor does not. Names of topics and
@@ -100,6 +101,11 @@ class Rule(Section):
     )
     whole: bool = setting(
         Flag(), "does nothing while a rule of higher rank or a person has taken a part of it", default=False
+    )
+    snapshot: bool = setting(
+        Flag(),
+        "when `do` begins, the executor writes the last seconds of its recording as a bag (bag_snapshot_s)",
+        default=False,
     )
 
     def steps(self, act: str) -> list[Step]:

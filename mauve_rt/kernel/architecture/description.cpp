@@ -28,7 +28,8 @@ ResourceFacts facts_of(const Resource& resource) {
                       .kind = resource.kind(),
                       .type = resource.type(),
                       .services = {},
-                      .longest_hold_ns = resource.longest_hold_ns()};
+                      .longest_hold_ns = resource.longest_hold_ns(),
+                      .frames = resource.frame_guard().declared()};
   for (const ServiceBase* service : resource.services())
     facts.services.push_back({.name = service->name(), .kind = service->kind(), .type = service->type()});
   return facts;
@@ -63,7 +64,8 @@ std::string text_of(const ComponentFacts& facts) {
     text += "  property " + property.name + " " + to_string(property.value) + "\n";
   for (const ShownPort& port : facts.parts.ports) {
     text += "  port " + port.name + " " + std::string(to_string(port.kind)) + " " + port.type;
-    text += port.resource.empty() ? "\n" : " -> " + port.resource + "." + port.service + "\n";
+    text += port.resource.empty() ? "" : " -> " + port.resource + "." + port.service;
+    text += port.frames == Frames{} ? "\n" : " in " + to_string(port.frames) + "\n";
   }
   return text;
 }
@@ -71,6 +73,7 @@ std::string text_of(const ComponentFacts& facts) {
 std::string text_of(const ResourceFacts& facts) {
   std::string text = "resource " + facts.name + " " + facts.kind + " " + facts.type + "\n";
   if (facts.longest_hold_ns != 0) text += "  longest_hold_ns " + std::to_string(facts.longest_hold_ns) + "\n";
+  if (facts.frames != Frames{}) text += "  in " + to_string(facts.frames) + "\n";
   for (const ServiceFacts& service : facts.services)
     text +=
         "  service " + service.name + " " + std::string(to_string(service.kind)) + " " + service.type + "\n";

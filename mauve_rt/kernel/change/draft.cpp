@@ -191,12 +191,13 @@ void Draft::remove_component(const std::string& name) {
 }
 
 void Draft::add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic,
-                         time_ns_t longest_hold_ns) {
+                         time_ns_t longest_hold_ns, const Frames& frames) {
   check_name("resource", name);
   if (find_resource(name) != nullptr) throw_taken("resource", name);
   resource->set_name(name);
   resource->set_log_queue(architecture_.log_queue());
   if (longest_hold_ns != 0) resource->set_longest_hold_ns(longest_hold_ns);
+  if (frames != Frames{}) resource->set_frames(frames);
   architecture_.prepare_outward(*resource, topic);
   resources_.push_back({.resource = std::move(resource), .added_step = step_});
   resources_by_name_.emplace(name, &resources_.back());

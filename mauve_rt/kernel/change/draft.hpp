@@ -135,7 +135,7 @@ class Draft {
   DraftComponent& add_component(const std::string& name, const TaskSettings& settings);
   void remove_component(const std::string& name);
   void add_resource(const std::string& name, std::shared_ptr<Resource> resource, TopicBinding topic,
-                    time_ns_t longest_hold_ns);
+                    time_ns_t longest_hold_ns, const Frames& frames);
   /// Throws Error (invalid_argument) while it is connected or bound to a topic.
   void remove_resource(const std::string& name);
   void set_property(DraftComponent& component, const std::string& name, const PropertyValue& value);
@@ -146,8 +146,10 @@ class Draft {
   int resynchronise_step() const noexcept { return resynchronise_step_; }
 
   /// Checks what only the whole shows: faults repaired, kept connections of new shells, structural properties, ports that must
-  /// lead somewhere, ports per service. Throws Error with the step.
-  void finish() const;
+  /// lead somewhere, ports per service, frames of a resource's ports. Throws Error with the step.
+  void finish();
+  /// The frames of resources whose ports change, of the resources and all ports at them. After finish().
+  const std::map<Resource*, Frames>& frames() const noexcept { return frames_; }
 
   /// Those that are there afterwards and were touched, in the order of the steps.
   std::list<DraftComponent>& components() noexcept { return components_; }
@@ -171,6 +173,8 @@ class Draft {
   static void check_core(const DraftComponent& component);
   void check_required_ports(const DraftComponent& component) const;
   void check_port_counts() const;
+  bool touches_frames() const;
+  void check_frames();
 
   Architecture& architecture_;
   bool deployed_;
@@ -184,6 +188,7 @@ class Draft {
   std::list<DraftResource> resources_;
   std::map<std::string, DraftResource*> resources_by_name_;
   std::vector<std::shared_ptr<Resource>> removed_resources_;
+  std::map<Resource*, Frames> frames_;
 };
 
 /// An error of a thing that knows neither its component nor the step.

@@ -16,7 +16,7 @@ void rethrow_as_of(const Error& failure, const std::string& component, int step)
   throw Error(failure.code(), failure.statement(), detail);
 }
 
-void Draft::finish() const {
+void Draft::finish() {
   for (const DraftComponent& component : components_) {
     if (component.only_epoch) continue;
     check_repaired(component);
@@ -34,6 +34,7 @@ void Draft::finish() const {
     if (component.runs && !component.ran) check_core(component);
   }
   check_port_counts();
+  check_frames();
 }
 
 void Draft::check_repaired(const DraftComponent& component) {
@@ -195,6 +196,81 @@ void Draft::check_port_counts() const {
     } catch (const Error& failure) {
       rethrow_as_of(failure, count.component, count.step);
     }
+  }
+}
+
+bool Draft::touches_frames() const {
+  const auto has_frames = [](const Wires& wires) {
+    return std::any_of(wires.begin(), wires.end(),
+                       [](const auto& wire) { return wire.second.frames != nullptr; });
+  };
+  const auto touches = [&](const DraftComponent& component) {
+    return has_frames(component.wires) || has_frames(component.wires_before);
+  };
+  return std::any_of(components_.begin(), components_.end(), touches) ||
+         std::any_of(removed_components_.begin(), removed_components_.end(), touches);
+}
+
+/// The first port of a resource that declares a frame says what all others are in.
+void Draft::check_frames() {
+  if (!touches_frames()) return;
+  struct End {
+    const std::string* component;
+    const std::string* port;
+    const Wire* wire;
+    int step;  // that connects it, or gives it another shell; 0: it stays
+  };
+  std::vector<End> ends;
+  const auto note = [&](const std::string& component, const Wires& wires, const DraftComponent* drafted) {
+    for (const auto& [port, wire] : wires) {
+      if (wire.service->resource() == nullptr) continue;
+      const int step = drafted == nullptr ? 0 : std::max(wire.step, drafted->shell_step);
+      ends.push_back({&component, &port, &wire, step});
+    }
+  };
+  const std::vector<Wiring> all = architecture_.wiring();
+  for (const auto& [component, wires] : all) {
+    if (!by_name_.contains(component->name()) && !is_removed(component->name()))
+      note(component->name(), *wires, nullptr);
+  }
+  for (const DraftComponent& component : components_) {
+    note(component.name(), component.wires, &component);
+    for (const auto& [port, wire] : component.wires_before) frames_.try_emplace(wire.service->resource());
+  }
+  for (const DraftComponent& component : removed_components_) {
+    for (const auto& [port, wire] : component.wires_before) frames_.try_emplace(wire.service->resource());
+  }
+  frames_.erase(nullptr);
+  std::stable_sort(ends.begin(), ends.end(), [](const End& a, const End& b) { return a.step < b.step; });
+  std::map<Resource*, std::vector<const End*>> first;  // that declare a frame that none before has declared
+  for (auto& [resource, frames] : frames_) frames = resource->frame_guard().declared();
+  for (const End& end : ends) {
+    if (end.wire->frames == nullptr) continue;
+    Resource* const resource = end.wire->service->resource();
+    const auto [place, is_new] = frames_.try_emplace(resource, resource->frame_guard().declared());
+    Frames& frames = place->second;
+    std::vector<const End*>& before = first[resource];
+    const auto difference = frame_difference(*end.wire->frames, frames);
+    if (!difference) {
+      const Frames merged = merged_frames(frames, *end.wire->frames);
+      if (merged != frames) before.push_back(&end);
+      frames = merged;
+      continue;
+    }
+    const auto other = std::find_if(before.begin(), before.end(), [&](const End* earlier) {
+      return frame_difference(*end.wire->frames, *earlier->wire->frames).has_value();
+    });
+    const std::string of = other == before.end()
+                               ? "resource " + end.wire->resource
+                               : "port " + *(*other)->component + "." + *(*other)->port + " at " +
+                                     (*other)->wire->resource + "." + (*other)->wire->service->name();
+    throw Error(ErrorCode::frame_mismatch, "two ports of a resource are in different frames",
+                {.component = *end.component,
+                 .element = "port " + *end.port,
+                 .expected = difference->ours + ", as the port declares",
+                 .found = difference->theirs + " of " + of,
+                 .remedy = std::string(kFrameRemedy),
+                 .step = end.step});
   }
 }
 

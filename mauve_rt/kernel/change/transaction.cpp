@@ -74,21 +74,23 @@ Transaction& Transaction::remove_component(const std::string& name) {
 }
 Transaction& Transaction::add_resource(const std::string& name, const std::string& kind,
                                        const std::string& type, ResourceParameters parameters,
-                                       TopicBinding topic, time_ns_t longest_hold_ns) {
+                                       TopicBinding topic, time_ns_t longest_hold_ns, const Frames& frames) {
   return add(steps::add_resource, name, {},
              NewResource{.kind = kind,
                          .type = type,
                          .parameters = std::move(parameters),
                          .topic = topic,
-                         .longest_hold_ns = longest_hold_ns});
+                         .longest_hold_ns = longest_hold_ns,
+                         .frames = frames});
 }
 Transaction& Transaction::add_resource(const std::string& name, std::unique_ptr<Resource> resource,
-                                       TopicBinding topic, time_ns_t longest_hold_ns) {
+                                       TopicBinding topic, time_ns_t longest_hold_ns, const Frames& frames) {
   return add(steps::add_resource, name, {},
              NewResource{.by_kind = false,
                          .resource = std::move(resource),
                          .topic = topic,
-                         .longest_hold_ns = longest_hold_ns});
+                         .longest_hold_ns = longest_hold_ns,
+                         .frames = frames});
 }
 Transaction& Transaction::remove_resource(const std::string& name) {
   return add(steps::remove_resource, name);

@@ -483,6 +483,7 @@ void TransactionCommit::Work::keep_for_report() {
   prepared_resources_.clear();
   lists_ = {};
   wires_.clear();
+  frames_.clear();
   added_.clear();
   elements_.clear();
   services_.clear();

@@ -248,6 +248,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   std::vector<Element> elements_{};  // of the components that were there
   std::vector<std::pair<Component*, std::shared_ptr<const Wires>>> wires_{};
   std::vector<Component*> added_{};
+  std::vector<std::pair<FrameGuard*, const Frames*>> frames_{};  // that change
   std::vector<ServiceBase*> services_{};  // to which a port is connected or disconnected
 };
 

@@ -84,6 +84,9 @@ void TransactionCommit::Work::prepare_publication() {
   wires_.clear();
   added_.clear();
   services_.clear();
+  frames_.clear();
+  for (const auto& [resource, frames] : draft_->frames())
+    frames_.emplace_back(&resource->frame_guard(), keep_frames(frames));
   const auto note = [this](DraftComponent& component, const Wires& wires) {
     const bool has_place = std::any_of(changes_.begin(), changes_.end(),
                                        [&](const Change& change) { return change.draft == &component; });
@@ -143,6 +146,7 @@ void TransactionCommit::Work::publish(time_ns_t instant_ns) noexcept {
   MAUVE_AUDIT(architecture_.commit_gate().is_looked_at_here());
   if (is_structural_) architecture_.swap_lists(lists_);
   for (auto& [component, wires] : wires_) component->swap_wires(wires);
+  for (const auto& [guard, frames] : frames_) guard->expect(frames);
   for (ServiceBase* service : services_) service->set_since_ns(instant_ns);
   if (draft_->forget_claims()) {
     for (const auto& component : draft_->claimed()) component->change_mark().release();

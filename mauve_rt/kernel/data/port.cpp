@@ -95,6 +95,7 @@ void PortBase::check(const ServiceBase& service) const {
                    "before Python makes ports and resources of the type"});
   }
   check_layout(service);
+  check_frames(service);
   if (!fits(service)) {
     throw Error(ErrorCode::type_mismatch, "port and service mean different C++ types by one name",
                 {.element = "port " + name_,
@@ -102,6 +103,39 @@ void PortBase::check(const ServiceBase& service) const {
                  .found = "another C++ type of that name at " + place,
                  .remedy = "let both packages use one declaration of the type, from one header"});
   }
+}
+
+void PortBase::declare_frames(const Frames& frames) {
+  const std::string element = "port " + name_;
+  if (kind_ != PortKind::read && kind_ != PortKind::write) {
+    throw Error(ErrorCode::invalid_argument, "the values of the port are in no frame",
+                {.element = element,
+                 .expected = "a port that reads or writes",
+                 .found = "a port of kind " + std::string(to_string(kind_)),
+                 .remedy = "declare no frame for the port"});
+  }
+  check_frame_names(frames, element);
+  const Frames before = frames_ == nullptr ? Frames{} : *frames_;
+  if (const auto difference = frame_difference(before, frames)) {
+    throw Error(ErrorCode::frame_mismatch, "the port declares another frame",
+                {.element = element,
+                 .expected = difference->ours + ", as its shell declares",
+                 .found = difference->theirs,
+                 .remedy = "remove one of the two declarations, or make them equal"});
+  }
+  frames_ = keep_frames(merged_frames(before, frames));
+}
+
+void PortBase::check_frames(const ServiceBase& service) const {
+  const Resource* const resource = service.resource();
+  if (frames_ == nullptr || resource == nullptr) return;
+  const auto difference = frame_difference(*frames_, resource->frame_guard().declared());
+  if (!difference) return;
+  throw Error(ErrorCode::frame_mismatch, "the port and the resource are in different frames",
+              {.element = "port " + name_,
+               .expected = difference->ours + ", as the port declares",
+               .found = difference->theirs + " of " + resource->name() + "." + service.name(),
+               .remedy = std::string(kFrameRemedy)});
 }
 
 void PortBase::check_layout(const ServiceBase& service) const {

@@ -81,6 +81,11 @@ void Resource::set_longest_hold_ns(time_ns_t longest_hold_ns) {
   longest_hold_ns_ = longest_hold_ns;
 }
 
+void Resource::set_frames(const Frames& frames) {
+  check_frame_names(frames, name_.empty() ? "frame" : description());
+  frame_guard_.declare(frames);
+}
+
 void Resource::begin_log(std::size_t /*bytes*/) {
   throw Error(ErrorCode::invalid_argument, "the resource has no values that could be recorded",
               {.element = description(),

@@ -195,7 +195,8 @@ void Component::show() {
     now.ports.push_back({port->name(), port->kind(), port->type(), port->resource_name(),
                          service == nullptr ? "" : service->name(),
                          service == nullptr ? 0 : service->longest_hold_ns(),
-                         service == nullptr ? std::vector<std::byte>{} : port->stop_message()});
+                         service == nullptr ? std::vector<std::byte>{} : port->stop_message(),
+                         port->frames() == nullptr ? Frames{} : *port->frames()});
   }
   for (const auto& property : parts_.shell->properties())
     now.properties.push_back({property->name(), property->boxed(), property->options()});
@@ -527,9 +528,18 @@ bool Component::is_fallback_in() const noexcept {
   return fallback_ != nullptr && fallback_->was_taken() && task_.has_fallen_back();
 }
 
+void Component::give_frames(Shell& shell) const {
+  for (const auto& [port, frames] : frames_) {
+    PortBase* const found = shell.find_port(port);
+    if (found != nullptr) found->declare_frames(frames);
+  }
+}
+
 Parts Component::another() const {
   const CoreBase& declared = is_fallback_in() ? *fallback_->core() : *parts_.core;
-  return {.shell = shell().another(), .core = declared.another(), .fsm = fsm().another()};
+  Parts parts{.shell = shell().another(), .core = declared.another(), .fsm = fsm().another()};
+  if (parts.shell != nullptr) give_frames(*parts.shell);
+  return parts;
 }
 
 void Component::configure_anew() {

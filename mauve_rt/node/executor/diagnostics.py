@@ -306,7 +306,8 @@ class Diagnostics:
         }
         remarks = self._grown("recording", counts)
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
-        message = "; ".join(remarks) or ("recording" if status.recording else "stopped")
+        recording = "recording into memory" if status.in_memory else "recording"
+        message = "; ".join(remarks) or (recording if status.recording else "stopped")
         if not (status.recording or status.is_complete):
             level, message = DiagnosticStatus.ERROR, "stopped, not complete: its disk has not answered"
         if status.error:

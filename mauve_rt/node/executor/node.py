@@ -40,7 +40,7 @@ from mauve_rt.node.shared.setting_parameters import NO_SIMULATED_TIME, declare_s
 from mauve_rt.node.shared.settings import OF_RCLPY, refusal
 from mauve_rt.node.shared.wall_clock import WallClock
 from mauve_rt.node.shared.watch import Watch
-from mauve_rt.trace.bag.recorded import COMPRESSIONS, Split
+from mauve_rt.trace.bag.recorded import COMPRESSIONS, Split, Window
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
@@ -113,6 +113,7 @@ class ExecutorNode(LifecycleNode):
             publish=self._state.send,
             event=self._state.event,
             follow=self._properties.follow,
+            snapshot=lambda: self._recording.snapshot().directory,
             watch=self.watch,
             folder=rules_folder(settings),
         )
@@ -274,17 +275,23 @@ class ExecutorNode(LifecycleNode):
         with self._properties.lock:
             names = ("rules", "bag", "record_topics", "record_topic_regexes")
             rules, bag, topics, expressions = (self.get_parameter(name).value for name in names)
-            split, compression = self._split(), self._compression()
+            split, compression, window = self._split(), self._compression(), self._window()
         self._rules.configure(rules)
         self._folder.configure(self._runtime)
         if bag:
             self._recording.start(
-                Path(bag), topics, split=split, expressions=expressions, compression=compression
+                Path(bag),
+                topics,
+                split=split,
+                expressions=expressions,
+                compression=compression,
+                window=window,
             )
         self._log_realtime()
         parts = counted(len(self._runtime.components()), "component")
         resources = counted(len(self._runtime.described_resources()), "resource")
-        recorded = f", recording to {bag}" if bag else ""
+        where = "memory, snapshots to " if window is not None else ""
+        recorded = f", recording to {where}{bag}" if bag else ""
         self.get_logger().info(f"configured: {self._runtime.model.path}: {parts}, {resources}{recorded}")
 
     def _compression(self) -> str:
@@ -294,6 +301,11 @@ class ExecutorNode(LifecycleNode):
                 f"parameter bag_compression: expected {' or '.join(COMPRESSIONS)}, found '{name}'"
             )
         return name
+
+    def _window(self) -> Window | None:
+        names = ("bag_snapshot_s", "bag_snapshot_bytes")
+        seconds, max_bytes = (self.get_parameter(name).value for name in names)
+        return Window(seconds=seconds, max_bytes=max_bytes) if seconds else None
 
     def _split(self) -> Split:
         names = ("bag_split_s", "bag_split_bytes", "bag_max_size_bytes")

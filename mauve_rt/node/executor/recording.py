@@ -23,12 +23,15 @@ from mauve_rt.model.threads import real_time_threads
 from mauve_rt.node.executor.bound_resources import BoundResources
 from mauve_rt.node.executor.received_topics import ReceivedTopics
 from mauve_rt.node.executor.topic_choice import Choice, TopicChoice
-from mauve_rt.trace.bag.recorded import SentMessage, Split
+from mauve_rt.trace.bag.recorded import SNAPSHOT_BYTES, SentMessage, Split, Window
 from mauve_rt.trace.errors import TraceError
 
 if TYPE_CHECKING:
     from mauve_rt.trace.recording.ledger import Entry
+    from mauve_rt.trace.recording.recent import WrittenSnapshot
     from mauve_rt.trace.recording.recorder import MessageSource, Recorder
+
+_SNAPSHOT_WAIT_S = 2.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,6 +50,8 @@ class RecordingStatus:
     """Why it ended by itself, or is paused; empty when it did not."""
     is_complete: bool
     """The recording has ended, and the bag is closed."""
+    in_memory: bool = False
+    """`bag` is the folder of its snapshots, and `messages` are those in memory."""
 
     @property
     def lost_before(self) -> int:
@@ -56,6 +61,10 @@ class RecordingStatus:
 
 class RecordingBusyError(MauveError):
     """A recording is under way, or starts."""
+
+
+class NotInMemoryError(MauveError):
+    """A snapshot is asked for, and no recording keeps the last seconds."""
 
 
 class Recording:
@@ -108,6 +117,7 @@ class Recording:
         values: Sequence[str] = (),
         expressions: Sequence[str] = (),
         compression: str = "none",
+        window: Window | None = None,
     ) -> Path:
         """Create the bag and record from now on; returns its folder, absolute.
 
@@ -121,6 +131,7 @@ class Recording:
             expressions: regular expressions; each topic whose name contains a match, as by a pattern.
             compression: of the chunks of the files, one of COMPRESSIONS.
             values: resources, or COMPONENT.PORT, whose every write is recorded, besides those of the file.
+            window: there is no bag: so much stays in memory, and snapshot() creates bags below the folder.
 
         Raises:
             ParameterError: a value is not there; a topic is written otherwise, nobody knows its type, that is
@@ -152,6 +163,7 @@ class Recording:
                 keeper=native_program("bag_keeper"),
                 waits_for_room=self._waits_for_room,
                 compression=compression,
+                window=window,
             )
             try:
                 self._record_into(recorder, shadows)
@@ -211,9 +223,34 @@ class Recording:
             self._unsubscribe()
             self._last, self._recorder = recorder, None
             status = _status(recorder)
+            if recorder.recent is not None and recorder.recent.written is not None:
+                recorder.recent.written.wait(_SNAPSHOT_WAIT_S)  # else the end of the process cuts it off
         if not is_complete:
             self._node.get_logger().error(not_complete(status))
         return status
+
+    def snapshot(self, bag: Path | None = None) -> "WrittenSnapshot":
+        """Begin to write the last seconds as a new bag, on a thread of its own; the recording goes on.
+
+        Without a `bag`, its folder is named by the time.
+
+        Raises:
+            RecordingBusyError: an earlier snapshot is still being written.
+            NotInMemoryError: no recording keeps the last seconds.
+
+        """
+        recorder = self._recorder
+        recent = recorder.recent if recorder is not None else None
+        if recent is None:
+            found = "nothing is being recorded" if recorder is None else "the recording writes a bag"
+            text = f"a snapshot needs a recording into memory (snapshot_s), and {found}"
+            raise NotInMemoryError(text)
+        name = f"snapshot_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S_%f}"[:-3]
+        written = recent.snapshot((bag or recent.directory / name).absolute())
+        if written is None:
+            text = f"{recent.written.directory if recent.written else 'a snapshot'} is still being written"
+            raise RecordingBusyError(f"{text}; ask again when it is complete")
+        return written
 
     @property
     def recording(self) -> bool:
@@ -303,6 +340,7 @@ def _status(recorder: "Recorder") -> RecordingStatus:
         others=recorder.others,
         error=recorder.error,
         is_complete=recorder.is_closed,
+        in_memory=recorder.recent is not None,
     )
 
 
@@ -337,25 +375,28 @@ class RecordingOrders:
         self._folder = folder.absolute()
 
     def carry_out(self, order: RecordingOrder) -> Outcome:
-        """Start or stop. TIMEOUT: the recording has ended, and its bag is not complete.
+        """Start, stop, or write a snapshot. TIMEOUT: the bag is not complete yet.
 
         Raises:
-            RefusalError: and nothing was started or stopped.
+            RefusalError: and nothing was started, stopped or written.
 
         """
-        return self._start(order) if order.start else self._stop()
+        if order.kind == "snapshot":
+            return self._snapshot(order)
+        return self._start(order) if order.kind == "start" else self._stop()
 
     def _start(self, order: RecordingOrder) -> Outcome:
         if not self._runtime.configured:
             raise RefusalError(
                 Code.NOT_ACTIVE, "the executor is not configured; configure it first (lifecycle)"
             )
-        bag = self._folder / (order.bag or f"mauve_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S}")
-        if self._folder.resolve() not in bag.resolve().parents:
-            text = (
-                f"bag '{order.bag}': expected a folder below {self._folder} (the executor's parameter bags)"
-            )
-            raise RefusalError(Code.INVALID, text)
+        window = None
+        if order.snapshot_s:
+            window = Window(seconds=order.snapshot_s, max_bytes=order.snapshot_bytes or SNAPSHOT_BYTES)
+        if window is not None and not order.bag:
+            bag = self._folder
+        else:
+            bag = self._below(order.bag or f"mauve_{datetime.now().astimezone():%Y_%m_%d-%H_%M_%S}")
         try:
             split = Split(
                 after_s=order.split_s or Split().after_s,
@@ -369,6 +410,7 @@ class RecordingOrders:
                 values=order.values,
                 expressions=order.topic_regexes,
                 compression=order.compression or "none",
+                window=window,
             )
         except ParameterError as error:
             raise RefusalError(Code.INVALID, str(error)) from error
@@ -376,7 +418,37 @@ class RecordingOrders:
             raise RefusalError(Code.ALREADY_RUNNING, str(error)) from error
         except TraceError as error:
             raise RefusalError(Code.PREPARE_FAILED, str(error)) from error
-        return Outcome(code=Code.OK, message=f"recording into {directory}", bag=str(directory))
+        where = str(directory)
+        if window is not None:
+            where = f"memory: the last {window.seconds:g} s, {window.max_bytes:,} bytes at most; "
+            where += f"snapshots are created in {directory}"
+        return Outcome(code=Code.OK, message=f"recording into {where}", bag=str(directory))
+
+    def _below(self, name: str) -> Path:
+        bag = self._folder / name
+        if self._folder.resolve() not in bag.resolve().parents:
+            text = f"bag '{name}': expected a folder below {self._folder} (the executor's parameter bags)"
+            raise RefusalError(Code.INVALID, text)
+        return bag
+
+    def _snapshot(self, order: RecordingOrder) -> Outcome:
+        try:
+            written = self._recording.snapshot(self._below(order.bag) if order.bag else None)
+        except NotInMemoryError as error:
+            raise RefusalError(Code.NOT_RUNNING, str(error)) from error
+        except RecordingBusyError as error:
+            raise RefusalError(Code.ALREADY_RUNNING, str(error)) from error
+        bag = str(written.directory)
+        if not written.wait(_SNAPSHOT_WAIT_S):
+            text = f"{bag} is still being written after {_SNAPSHOT_WAIT_S:g} s; the recording goes on. "
+            return Outcome(
+                code=Code.TIMEOUT, message=f"{text}Check the bag: mauve trace check {bag}", bag=bag
+            )
+        if written.error:
+            raise RefusalError(Code.PREPARE_FAILED, written.error)
+        assert written.snapshot is not None  # noqa: S101 - for mypy
+        words = f"{written.messages:,} messages are in {bag}: {written.snapshot.text}"
+        return Outcome(code=Code.OK, message=words, bag=bag)
 
     def _stop(self) -> Outcome:
         status = self._recording.stop()
@@ -385,6 +457,8 @@ class RecordingOrders:
         if not status.is_complete:
             return Outcome(code=Code.TIMEOUT, message=not_complete(status), bag=status.bag)
         words = f"{status.messages:,} messages are in {status.bag}"
+        if status.in_memory:
+            words = f"the recording into memory has ended; its snapshots are in {status.bag}"
         if status.dropped:
             words += f"; {status.dropped:,} were dropped"
         if status.lost_before:

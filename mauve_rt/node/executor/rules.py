@@ -59,6 +59,7 @@ class OwnRules:
         publish: Callable[[Any, str, Any, QoSProfile], None],
         event: Callable[[Request, Outcome], None],
         follow: Callable[[], None],
+        snapshot: Callable[[], Path],
         watch: Watch,
         folder: Path,
     ) -> None:
@@ -71,6 +72,8 @@ class OwnRules:
         load() reads files below `folder` only.
 
         `event` tells of what was done; `follow` lets parameters follow it.
+
+        `snapshot` begins to write a snapshot of the recording, and returns its folder.
         """
         self._node = node
         self._runtime = runtime
@@ -80,6 +83,7 @@ class OwnRules:
         self._publish = publish
         self._event = event
         self._follow = follow
+        self._snapshot = snapshot
         self._watch = watch
         self._folder = folder.absolute()
         self._qos = QoSProfile(depth=KEPT_DECISIONS, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -314,6 +318,11 @@ class OwnRules:
             console.error(late)
         (console.error if message.decision == "failed" else console.info)(text)
         self._publish(self._decisions, messages.TYPE, message, self._qos)
+        if message.decision == "do" and self._known[message.rule].snapshot:
+            try:
+                console.info(f"rule {message.rule}: its snapshot is written to {self._snapshot()}")
+            except MauveError as error:
+                console.error(f"rule {message.rule}: no snapshot: {error}")
 
     def _stamp(self, monotonic: int) -> Any:
         """An instant of the monotonic clock, as ROS counts."""

@@ -26,6 +26,7 @@ from mauve_msgs.srv import (
     StartRecording,
     Stop,
     StopRecording,
+    WriteSnapshot,
 )
 from mauve_rt._kernel import HELD_STOPPED, KEPT
 from mauve_rt.control.control import Control
@@ -129,6 +130,7 @@ class Services:
             (Reload, "~/reload", _reload),
             (StartRecording, "~/start_recording", _start_recording),
             (StopRecording, "~/stop_recording", _stop_recording),
+            (WriteSnapshot, "~/write_snapshot", _write_snapshot),
         ):
             handler = self._handler(translate)
             opened = node.create_service(service, name, handler, callback_group=control_group)
@@ -164,8 +166,8 @@ class Services:
 
     def _carry_out(self, request: Request) -> Outcome:
         self.note_answered()
-        if request.recording is not None and not request.recording.start:
-            self._state.flush()  # the bag that ends tells of all that was in it
+        if request.recording is not None and request.recording.kind != "start":
+            self._state.flush()  # the bag has all messages up to its end
         outcome = self._control.handle(request)
         if not outcome.replayed:
             self._untold.events.append(self._state.take_down(request, outcome))
@@ -361,6 +363,7 @@ _WAITS_FOR_NONE = (  # a stop or a start by itself, the way out, and what may wa
     AbandonChange.Request,
     StartRecording.Request,
     StopRecording.Request,
+    WriteSnapshot.Request,
 )
 
 
@@ -404,7 +407,7 @@ def _reload(ros: Any) -> Request:
 
 def _start_recording(ros: Any) -> Request:
     order = RecordingOrder(
-        start=True,
+        kind="start",
         bag=ros.bag,
         topics=tuple(ros.topics),
         topic_regexes=tuple(ros.topic_regexes),
@@ -413,12 +416,18 @@ def _start_recording(ros: Any) -> Request:
         split_bytes=ros.split_bytes,
         max_size_bytes=ros.max_size_bytes,
         compression=ros.compression,
+        snapshot_s=ros.snapshot_s,
+        snapshot_bytes=ros.snapshot_bytes,
     )
     return Request(recording=order, **_common(ros))
 
 
 def _stop_recording(ros: Any) -> Request:
-    return Request(recording=RecordingOrder(start=False), **_common(ros))
+    return Request(recording=RecordingOrder(kind="stop"), **_common(ros))
+
+
+def _write_snapshot(ros: Any) -> Request:
+    return Request(recording=RecordingOrder(kind="snapshot", bag=ros.bag), **_common(ros))
 
 
 def _probation_value(ros: Any) -> str:

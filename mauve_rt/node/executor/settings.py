@@ -14,6 +14,7 @@ from mauve_rt.file_schema.words import shown
 from mauve_rt.model import ArchitectureModel, Overrides, load_architecture
 from mauve_rt.node.shared.ros_arguments import RosArguments, parse_ros_arguments
 from mauve_rt.node.shared.settings import Setting, check_given, near_misses, usage, values_of
+from mauve_rt.trace.bag.recorded import MIN_WINDOW_BYTES, SNAPSHOT_BYTES
 
 _LIMITS = RequestLimits()
 MAX_PHASE_TIMEOUT_S = 2.0  # events that come later may have to wait for it
@@ -22,7 +23,10 @@ _CONFIGURED: Any = "when configured"
 PARAMETERS: dict[str, Setting] = {
     "architecture": Setting("", "architecture file"),
     "bag": Setting(
-        "", "folder of a bag to record from the start; must not exist yet; empty: no recording", _CONFIGURED
+        "",
+        "folder of a bag to record from the start; must not exist yet; with bag_snapshot_s the folder in "
+        "which snapshots are created; empty: no recording",
+        _CONFIGURED,
     ),
     "bags": Setting("", "folder in which ~/start_recording creates bags; empty: the working directory"),
     "record_topics": Setting(
@@ -54,6 +58,19 @@ PARAMETERS: dict[str, Setting] = {
         minimum=0,
     ),
     "bag_compression": Setting("none", "compression of the chunks of a recording: none or zstd", _CONFIGURED),
+    "bag_snapshot_s": Setting(
+        0.0,
+        "time of which a recording keeps the last data in memory, for ~/write_snapshot, in s; "
+        "0: it writes a bag",
+        _CONFIGURED,
+        minimum=0,
+    ),
+    "bag_snapshot_bytes": Setting(
+        SNAPSHOT_BYTES,
+        "largest memory of bag_snapshot_s, in bytes; beyond it the oldest data is dropped sooner",
+        _CONFIGURED,
+        minimum=MIN_WINDOW_BYTES,
+    ),
     "bag_waits_for_room": Setting(
         default=False,
         description="a disk that is full or fails pauses a recording until it writes again; else it ends it",

@@ -23,7 +23,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
-from mauve_msgs.srv import ListComponents, Reconfigure
+from mauve_msgs.srv import ListComponents, Reconfigure, WriteSnapshot
 from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
@@ -78,6 +78,8 @@ class Supervisor:
         self._service = node.resolve_service_name(f"{executor}/reconfigure")
         self._change = node.create_client(Reconfigure, f"{executor}/reconfigure")
         self._try = node.create_client(Reconfigure, f"{executor}/reconfigure")
+        self._snapshot = node.create_client(WriteSnapshot, f"{executor}/write_snapshot")
+        self._snapshot_rules = {rule.name for rule in rules_file.rules.rules if rule.snapshot}
         self._list = node.create_client(ListComponents, f"{executor}/list_components")
         self._timer = node.create_timer(
             _LONGEST_S, watch.guarded("the rules", self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME)
@@ -197,6 +199,28 @@ class Supervisor:
         else:
             self._node.get_logger().info(text)
         self._decisions.publish(decision_message(decision, self._node.get_clock().now().to_msg()))
+        if decision.decision == "do" and decision.rule in self._snapshot_rules:
+            self._write_snapshot(decision)
+
+    def _write_snapshot(self, decision: Decision) -> None:
+        if not self._snapshot.service_is_ready():
+            text = f"{decision.rule}: no snapshot: service {self._snapshot.srv_name} is not there"
+            self._node.get_logger().error(text)
+            return
+        cause = f"{decision.rule}: {decision.reason}"
+        who = self._node.get_fully_qualified_name()
+        request = WriteSnapshot.Request(requested_by=who, cause=cause)
+        on_snapshot = self.watch.guarded("the reply about a snapshot", self._on_snapshot)
+        future = self._snapshot.call_async(request)
+        future.add_done_callback(lambda future: on_snapshot(decision.rule, future))
+
+    def _on_snapshot(self, rule: str, future: Any) -> None:
+        reply, failure = future.result(), future.exception()
+        if failure is None and reply.success:
+            self._node.get_logger().info(f"{rule}: snapshot: {reply.message}")
+        else:
+            what = reply.message if failure is None else str(failure)
+            self._node.get_logger().error(f"{rule}: no complete snapshot: {what}")
 
 
 def run_node(arguments: Sequence[str], start: RosStart, stop: threading.Event) -> int:

@@ -20,6 +20,7 @@ The summary is kept as bytes that only grow, so a flush costs the new messages p
 the file. Format: https://mcap.dev/spec.
 """
 
+import contextlib
 import errno
 import functools
 import os
@@ -74,6 +75,7 @@ class McapFile:
         self._before = self._now
         self._descriptor = -1
         self._is_lost = False
+        self._lacks_end = False  # a flush failed, and what it wrote may still be in the file
         self._disk = disk or Disk()
         unfinished = path.with_name(f".{path.name}.new")
         try:
@@ -213,8 +215,8 @@ class McapFile:
         self._check_place()
 
     def _less_than(self, before: "_Finished") -> int | None:
-        """The size that the file is cut to, where it is less than it was."""
-        return self.size if self.size < before.data_end + len(before.tail) else None
+        """The size that the file is cut to, where it is, or may be, less than it was."""
+        return self.size if self._lacks_end or self.size < before.data_end + len(before.tail) else None
 
     def _build(self, chunk: PendingChunk, before: "_Finished") -> Sequence[bytes | bytearray]:
         """Let `_now` be the file with that chunk; returns what is to be written behind its data."""
@@ -247,6 +249,7 @@ class McapFile:
         except OSError as error:
             msg = f"bag file {self.path}: writing failed ({error.strerror}); {self.undo_flush()}"
             raise DiskError(msg) from error
+        self._lacks_end = False
 
     def _check_place(self) -> None:
         """The system lets a file be written that has no name any longer."""
@@ -268,11 +271,28 @@ class McapFile:
         """
         self._now, self._chunk = self._before, self._written
         del self._chunk_indexes[self._now.index_bytes :]
+        self._lacks_end = True
+        try:
+            self.put_back()
+        except DiskError as error:
+            return f"{error}: the file needs repair"
+        return f"the file is complete up to the flush before, {counted(self.flushed.messages, 'message')}"
+
+    def put_back(self) -> None:
+        """Write the old end, where a flush that failed may have left another one.
+
+        Raises:
+            DiskError: the system refused.
+
+        """
+        if not self._lacks_end:
+            return
         try:
             self._disk.write(self._descriptor, (self._now.tail,), self._now.data_end, size=self.size)
         except OSError as error:
-            return f"the old end could not be put back either ({error.strerror}): the file needs repair"
-        return f"the file is complete up to the flush before, {counted(self.flushed.messages, 'message')}"
+            msg = f"the old end could not be put back either ({error.strerror})"
+            raise DiskError(msg) from error
+        self._lacks_end = False
 
     def close(self) -> None:
         """Finish and close.
@@ -288,9 +308,11 @@ class McapFile:
 
     def abort(self) -> None:
         """Close without writing what waits; the file stays as the last flush left it. May be called again."""
-        descriptor, self._descriptor = self._descriptor, -1
-        if descriptor >= 0:
-            os.close(descriptor)
+        if self._descriptor >= 0:
+            with contextlib.suppress(DiskError):
+                self.put_back()
+            os.close(self._descriptor)
+            self._descriptor = -1
 
     def _finished(
         self, counts: Counts, chunk_count: int, data_end: int, data_crc: int, room_bytes: int

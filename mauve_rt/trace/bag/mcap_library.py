@@ -41,6 +41,8 @@ except ImportError as error:
     raise libraries_missing(error) from error
 
 __all__ = [
+    "MESSAGE_BYTES",
+    "READ_OPCODES",
     "Channel",
     "Chunk",
     "ChunkIndex",
@@ -66,6 +68,8 @@ __all__ = [
 _MESSAGE = int(Opcode.MESSAGE)  # an enum is compared more slowly, and there are many
 _MESSAGE_INDEX = int(Opcode.MESSAGE_INDEX)
 _MESSAGE_HEAD = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
+MESSAGE_BYTES = _MESSAGE_HEAD.size
+"""The least of a message, without opcode and length."""
 _INDEX_HEAD = struct.Struct("<HI")  # channel, bytes of entries
 _INDEX_ENTRY = struct.Struct("<QQ")  # log time, offset in the chunk
 _KINDS: dict[int, Any] = {

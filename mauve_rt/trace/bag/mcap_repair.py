@@ -20,7 +20,6 @@ from mauve_rt.trace.bag.mcap_library import (
     Chunk,
     ChunkIndex,
     DataEnd,
-    Message,
     MessageIndex,
     Opcode,
     Schema,
@@ -42,8 +41,7 @@ class _ChunkSeen:
     """A chunk of the data section, and the message indexes behind it."""
 
     def __init__(self, found: Found, chunk: Chunk) -> None:
-        self.messages: Entries = {}
-        """As the chunk itself tells."""
+        self._found = found
         self.indexed: Entries = {}
         """As the indexes tell."""
         self.is_followed = False
@@ -60,9 +58,16 @@ class _ChunkSeen:
             message_start_time=chunk.message_start_time,
             uncompressed_size=chunk.uncompressed_size,
         )
-        for at, one in found.inside:
-            if isinstance(one, Message):
-                self.messages.setdefault(one.channel_id, []).append((one.log_time, at))
+
+    def messages(self) -> Entries:
+        """As the chunk itself tells."""
+        found = self._found.messages
+        log_times = found.heads["log_time_ns"]
+        entries: Entries = {}
+        for channel in found.firsts:
+            rows = found.of_channel(channel)
+            entries[channel] = list(zip(log_times[rows].tolist(), found.at[rows].tolist(), strict=True))
+        return entries
 
     def add_index(self, offset: int, end: int, index: MessageIndex) -> None:
         """Take note of a message index behind it."""
@@ -72,13 +77,13 @@ class _ChunkSeen:
 
     def is_indexed(self) -> bool:
         """Whether the indexes behind it are those of this chunk."""
-        return _sorted(self.indexed) == _sorted(self.messages)
+        return _sorted(self.indexed) == _sorted(self.messages())
 
     def index_again(self) -> bytes:
         """Return message indexes to be written right behind it."""
         self._index.message_index_offsets = {}
         out = b""
-        for channel, entries in self.messages.items():
+        for channel, entries in self.messages().items():
             self._index.message_index_offsets[channel] = self.end + len(out)
             out += serialized(MessageIndex(channel, entries))
         self._index.message_index_length = len(out)
@@ -86,7 +91,7 @@ class _ChunkSeen:
 
     def entry(self) -> ChunkIndex | None:
         """Return its record in the summary; None: it has no place there, as it holds no message."""
-        return self._index if self.messages else None
+        return self._index if len(self._found.messages) else None
 
 
 class _Chunks:
@@ -204,9 +209,11 @@ def examine(path: Path, *, progress: Progress = silent) -> FileState:
             chunk_count += isinstance(record, Chunk)
             if found.opcode in others:
                 others[found.opcode] += 1
-            for _, one in found.inside:
-                if isinstance(one, Message):
-                    counts.add(one.channel_id, one.log_time)
+            if len(found.messages):
+                times = found.messages.heads["log_time_ns"]
+                start_ns, end_ns = int(times.min()), int(times.max())
+                for channel, count in found.messages.counts().items():
+                    counts.add_many(channel, count, start_ns=start_ns, end_ns=end_ns)
             progress(scan.whole_bytes / max(scan.size, 1), "examining")
         told = scan.summary()
         whole_bytes, missing = scan.whole_bytes, b""

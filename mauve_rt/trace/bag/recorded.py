@@ -102,3 +102,17 @@ class Split:
             expected = f"expected at least twice the size of a file, {2 * self.after_bytes:,} bytes"
             return f"{expected}, found {self.max_bytes:,}; choose a larger limit or smaller files"
         return ""
+
+
+MIN_WINDOW_BYTES = 100_000
+SNAPSHOT_BYTES = 268_435_456  # 256 MiB
+"""Default of the memory for snapshots."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Window:
+    """The last seconds that a recording keeps in memory, for snapshots, instead of writing a bag."""
+
+    seconds: float
+    max_bytes: int = SNAPSHOT_BYTES
+    """Of the memory: beyond it the oldest records and messages are dropped sooner."""

@@ -268,6 +268,7 @@ class BagWriter:
             DiskError: as flush; the bag is as before.
 
         """
+        self._file.put_back()  # else it may hold a flush that no metadata.yaml counts
         before, self._file = self._file, self._new_file(self.directory, self._number + 1)
         self._complete.append(BagFileCounts(before.path.name, before.flushed, before.size))
         try:

@@ -31,15 +31,13 @@ class Counts:
 
     def add(self, channel_id: int, log_time_ns: int) -> None:
         """Count one message."""
-        self.start_ns = min(self.start_ns, log_time_ns) if self.by_channel else log_time_ns
-        self.end_ns = max(self.end_ns, log_time_ns)
-        self.by_channel[channel_id] = self.by_channel.get(channel_id, 0) + 1
+        self.add_many(channel_id, 1, start_ns=log_time_ns, end_ns=log_time_ns)
 
     def add_many(self, channel_id: int, messages: int, *, start_ns: int, end_ns: int) -> None:
-        """Count messages of one channel."""
-        added = Counts({channel_id: messages}, start_ns, end_ns)
-        both = self.plus(added)
-        self.by_channel, self.start_ns, self.end_ns = both.by_channel, both.start_ns, both.end_ns
+        """Count messages of one channel; the times may be those of other channels counted along with it."""
+        self.start_ns = min(self.start_ns, start_ns) if self.by_channel else start_ns
+        self.end_ns = max(self.end_ns, end_ns)
+        self.by_channel[channel_id] = self.by_channel.get(channel_id, 0) + messages
 
     def plus(self, other: "Counts") -> "Counts":
         """Return the counts of both together; neither is changed."""

@@ -17,7 +17,14 @@ from mauve_rt.trace.reading.facts import Loss
 from mauve_rt.trace.reading.reader import open_trace
 from mauve_rt.trace.reading.split_changes import SplitChange, has_takes_without_instant, split_changes
 from mauve_rt.trace.reading.trace import Trace
-from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, INTERRUPTIONS, Entry, Interruption, ledger_of
+from mauve_rt.trace.recording.ledger import (
+    DROPPED_MESSAGES,
+    INTERRUPTIONS,
+    Entry,
+    Interruption,
+    ledger_of,
+    snapshot_of,
+)
 
 
 @dataclass(frozen=True)
@@ -71,6 +78,9 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
         for name, rows in trace.records.items()
         for split in split_changes(rows)
     ]
+    if (snapshot := snapshot_of(state.custom_data)) is not None:
+        torn = "" if snapshot.is_complete else "; the bag has its begin only: the executor or its disk failed"
+        found.append(Finding(f"{snapshot.text}{torn}", is_loss=bool(torn)))
     found += [Finding(text) for text in _deleted(state)]
     return found + _notes(trace) + [Finding(text) for text in _not_known(ledger)]
 

@@ -5,14 +5,14 @@ killed, gives all it has. metadata.yaml is not consulted: the files tell the sam
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mauve_rt.trace.bag.deletion import Deleted, deleted_of
 from mauve_rt.trace.bag.files import bag_files
-from mauve_rt.trace.bag.mcap_library import Channel, Message
+from mauve_rt.trace.bag.mcap_library import Channel
 from mauve_rt.trace.bag.mcap_scan import McapScan
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import decode_batch
@@ -24,7 +24,7 @@ from mauve_rt.trace.reading.facts import OWN_TYPES, BagFile, Deployment
 from mauve_rt.trace.reading.messages import MessageTypes, messages, monotonic_ns, payloads
 from mauve_rt.trace.reading.records_read import NO_RECORDS, RecordsRead
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE, Shadow
-from mauve_rt.trace.reading.stored_messages import StoredMessages, scan_of
+from mauve_rt.trace.reading.stored_messages import MessagesOf, StoredMessages, scan_of
 from mauve_rt.trace.reading.trace import Trace
 from mauve_rt.trace.recording.ledger import Entry, ledger_of
 
@@ -63,8 +63,8 @@ def open_trace(path: str | Path, *, progress: Progress = silent) -> Trace:
             continue
         stored = StoredMessages(file)
         with scan_of(file) as scan:
-            for counts, found in stored.first_pass(scan):
-                content.add(scan, counts, found)
+            for counts, messages_of in stored.first_pass(scan):
+                content.add(scan, counts, messages_of)
                 progress((done + scan.whole_bytes) / total, "reading")
             content.ledger = ledger_of(scan.custom_data) or content.ledger
             content.deleted = deleted_of(scan.custom_data) or content.deleted
@@ -103,7 +103,7 @@ class _Content:
         self._kinds: dict[int, RecordKind] = {}
         self._shadows: list[Shadow] = []  # with times of CLOCK_REALTIME
 
-    def add(self, scan: "McapScan | SqliteScan", counts: Mapping[int, int], found: Sequence[Message]) -> None:
+    def add(self, scan: "McapScan | SqliteScan", counts: Mapping[int, int], messages_of: MessagesOf) -> None:
         own: dict[int, tuple[Channel, str]] = {}
         for number, count in counts.items():
             channel = scan.channels[number]
@@ -113,11 +113,8 @@ class _Content:
             if type_name in _READ_TYPES:
                 own[number] = (channel, type_name)
         if own:
-            for message in found:
-                if message.channel_id in own:
-                    self._add_own(
-                        scan, *own[message.channel_id], message.data, published_ns=message.publish_time
-                    )
+            for message in messages_of(own):
+                self._add_own(scan, *own[message.channel_id], message.data, published_ns=message.publish_time)
 
     def _add_own(
         self,

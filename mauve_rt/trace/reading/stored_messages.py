@@ -4,19 +4,20 @@ The first pass over a file notes which chunk holds which channels. Later passes 
 need: a report asks for topics with some ten messages in a file of some hundred megabytes.
 """
 
+import functools
 import os
 import struct
 from array import array
-from collections import Counter
-from collections.abc import Callable, Collection, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from mauve_rt.trace.bag.files import MCAP
+from mauve_rt.trace.bag.mcap_columns import Integers, MessageColumns, rows_at
 from mauve_rt.trace.bag.mcap_library import Channel, Chunk, McapError, Message, Opcode, Schema, read_record
 from mauve_rt.trace.bag.mcap_limits import McapLimits
 from mauve_rt.trace.bag.mcap_scan import Found, McapScan
@@ -28,23 +29,11 @@ if TYPE_CHECKING:
 
 IsWanted = Callable[[str, str], bool]
 """Of a topic and its type."""
-Integers = npt.NDArray[np.int64]
+MessagesOf = Callable[[Collection[int]], Iterator[Message]]
+"""Of the channels with these numbers."""
 
 _RECORD = struct.Struct("<BQHIQQ")  # opcode, length; of a message: channel, sequence, log time, publish time
 _CHUNK, _MESSAGE = int(Opcode.CHUNK), int(Opcode.MESSAGE)
-_MESSAGE_HEAD = np.dtype(
-    [
-        ("opcode", "<u1"),
-        ("length", "<u8"),
-        ("channel", "<u2"),
-        ("sequence", "<u4"),
-        ("log_time_ns", "<u8"),
-        ("published_ns", "<u8"),
-    ]
-)  # as _RECORD
-_MESSAGE_ROW = np.dtype(
-    [("channel", "<u2"), ("log_time_ns", "<u8"), ("published_ns", "<u8"), ("begin", "<i8"), ("size", "<i8")]
-)
 _BLOCK_BYTES = 16 << 20
 _OBJECT_BYTES = 100  # what a message costs besides its own bytes, about
 _RUN_BYTES = 1 << 20  # messages outside of chunks are read together, about so many bytes at once
@@ -78,7 +67,7 @@ class PackedData(NamedTuple):
 
     def together(self, indices: Integers) -> npt.NDArray[np.uint8]:
         """Return some, all of one size, as an array of a row each."""
-        return _rows_at(self.buffer, self.begins[indices], int(self.sizes[indices[0]]))
+        return rows_at(self.buffer, self.begins[indices], int(self.sizes[indices[0]]))
 
 
 class MessageBlock(NamedTuple):
@@ -111,8 +100,8 @@ class StoredMessages:
         self._defined: dict[tuple[type, int], Schema | Channel] = {}
         self._needs_scan = path.suffix != MCAP
 
-    def first_pass(self, scan: "McapScan | SqliteScan") -> Iterator[tuple[Counter[int], list[Message]]]:
-        """Yield the messages of the file, some at a time, and how many each channel has among them.
+    def first_pass(self, scan: "McapScan | SqliteScan") -> Iterator[tuple[Mapping[int, int], MessagesOf]]:
+        """Yield how many messages each channel has, some at a time, and what returns these messages.
 
         Raises:
             TraceError: the file cannot be read.
@@ -120,16 +109,14 @@ class StoredMessages:
         """
         if isinstance(scan, McapScan):
             for found in scan.found():
-                messages = [one for _, one in found.inside if type(one) is Message]
-                counts = Counter([one.channel_id for one in messages])
-                if len(messages) < len(found.inside):
-                    self._define(one for _, one in found.inside if isinstance(one, Schema | Channel))
+                self._define(found.definitions)
+                counts = found.messages.counts()
                 if counts:
                     self._note(found, counts)
-                yield counts, messages
+                    yield counts, found.messages.messages
         else:
             for _, message in scan.messages():
-                yield Counter((message.channel_id,)), [message]
+                yield {message.channel_id: 1}, functools.partial(_only, message)
 
     def messages(self, is_wanted: IsWanted) -> Iterator[StoredMessage]:
         """Yield the messages whose topic and type are wanted, in the order of the file.
@@ -164,15 +151,16 @@ class StoredMessages:
             yield from _blocks_of(_scanned(self._path, is_wanted))
             return
         for data in _joined(self._pieces(wanted)):
-            rows = _message_rows(data)
-            for number in np.unique(rows["channel"]).tolist():
+            found = _columns_of(data)
+            begins, sizes = found.begins, found.sizes
+            for number in sorted(found.firsts):
                 if number in wanted:
-                    found = rows[rows["channel"] == number]
+                    rows = found.of_channel(number)
                     yield MessageBlock(
                         *wanted[number],
-                        found["log_time_ns"],
-                        found["published_ns"],
-                        PackedData(data, found["begin"], found["size"]),
+                        found.heads["log_time_ns"][rows],
+                        found.heads["published_ns"][rows],
+                        PackedData(data, begins[rows], sizes[rows]),
                     )
 
     def _wanted(self, is_wanted: IsWanted) -> dict[int, tuple[Channel, Schema | None]] | None:
@@ -246,8 +234,8 @@ def _joined(pieces: Iterator[bytes]) -> Iterator[bytes]:
     yield b"".join(waiting)
 
 
-def _message_rows(data: bytes) -> npt.NDArray[Any]:
-    """Return what stands before each message among these records, and where its payload is."""
+def _columns_of(data: bytes) -> MessageColumns:
+    """Return the messages among these records."""
     places: list[int] = []
     at, size = 0, len(data)
     while at + _RECORD.size <= size:
@@ -255,22 +243,7 @@ def _message_rows(data: bytes) -> npt.NDArray[Any]:
         if opcode == _MESSAGE:
             places.append(at)
         at += HEAD.size + length
-    begins = np.array(places, np.int64)
-    heads = _rows_at(data, begins, _RECORD.size).reshape(-1).view(_MESSAGE_HEAD)
-    rows = np.empty(len(places), _MESSAGE_ROW)
-    for name in ("channel", "log_time_ns", "published_ns"):
-        rows[name] = heads[name]
-    rows["begin"] = begins + _RECORD.size
-    rows["size"] = heads["length"] - np.uint64(_RECORD.size - HEAD.size)
-    return rows
-
-
-def _rows_at(data: bytes, begins: Integers, size: int) -> npt.NDArray[np.uint8]:
-    """Return the `size` bytes from each place on, as an array of a row each."""
-    if not len(begins) or not size:
-        return np.empty((len(begins), size), np.uint8)
-    windows = np.lib.stride_tricks.sliding_window_view(np.frombuffer(data, np.uint8), size)
-    return np.asarray(windows[begins], np.uint8)
+    return MessageColumns.of_places(data, places)
 
 
 def _blocks_of(messages: Iterator[StoredMessage]) -> Iterator[MessageBlock]:
@@ -294,6 +267,10 @@ def _block_of(found: list[StoredMessage]) -> MessageBlock:
         np.array([one.published_ns for one in found], np.uint64),
         PackedData(b"".join(one.data for one in found), np.cumsum(sizes) - sizes, sizes),
     )
+
+
+def _only(message: Message, _channels: Collection[int]) -> Iterator[Message]:
+    yield message
 
 
 def _scanned(path: Path, is_wanted: IsWanted) -> Iterator[StoredMessage]:

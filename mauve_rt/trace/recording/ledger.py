@@ -11,6 +11,8 @@ LEDGER = "mauve_topics"
 `received - lost + repeated - deleted` messages."""
 INTERRUPTIONS = "mauve_interruptions"
 """Key in the custom data of metadata.yaml: a JSON list of each Interruption."""
+SNAPSHOT = "mauve_snapshot"
+"""Key in the custom data of metadata.yaml: a JSON object, the Snapshot that the bag is."""
 
 
 class Entry(NamedTuple):
@@ -33,6 +35,14 @@ class Entry(NamedTuple):
     def recorded(self) -> int:
         """What the bag has of it."""
         return self.received - self.lost + self.repeated - self.deleted
+
+    def since(self, before: "Entry") -> "Entry":
+        """Return what came after `before`, an earlier entry of the same recording."""
+        return self._replace(
+            received=self.received - before.received,
+            lost=self.lost - before.lost,
+            lost_before=self.lost_before - before.lost_before,
+        )
 
     def plus(self, other: "Entry") -> "Entry":
         """Return both together: of a topic that is recorded twice, in one bag or in several."""
@@ -66,3 +76,36 @@ class Interruption(NamedTuple):
     """0: the bag ends with it."""
     records: int = 0
     """Trace records that are not in the bag; messages are in the ledger."""
+
+
+class Snapshot(NamedTuple):
+    """The last seconds of a recording into memory, written as a bag on request. Times: CLOCK_REALTIME."""
+
+    asked_s: float
+    """So many of the last seconds a recording keeps."""
+    from_ns: int
+    until_ns: int
+    max_bytes: int
+    """The limit of the memory."""
+    is_short: bool
+    """The memory was full: it held fewer seconds."""
+    is_complete: bool = False
+    """All of it is in the bag."""
+
+    @property
+    def text(self) -> str:
+        """One sentence."""
+        held = f"snapshot of {(self.until_ns - self.from_ns) / 1e9:.1f} s"
+        if not self.is_short:
+            return held
+        return f"{held}: the memory (snapshot_bytes, {self.max_bytes:,}) holds no more of {self.asked_s:g} s"
+
+
+def snapshot_of(custom_data: Mapping[str, str]) -> Snapshot | None:
+    """Return the snapshot that a bag is; None: it is none."""
+    try:
+        snapshot = Snapshot(**json.loads(custom_data[SNAPSHOT]))
+        is_ours = bool(snapshot.text)  # values of other types give no text
+    except (KeyError, ValueError, TypeError):  # none, or somebody else wrote it
+        return None
+    return snapshot if is_ours else None

@@ -8,9 +8,10 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from mauve_rt.trace.bag.disk import KeptDisk
-from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos
+from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessage, Split, TopicQos, Window
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.recording.ledger import DROPPED_MESSAGES, Entry
+from mauve_rt.trace.recording.recent import RecentBag
 from mauve_rt.trace.recording.sources import Drain, MessageSource, TopicSource, TraceSource
 from mauve_rt.trace.recording.tap import Tap
 from mauve_rt.trace.recording.trace_bag import BATCHES, NAMES, TraceBag
@@ -72,6 +73,7 @@ class Recorder:
         keeper: Path | None = None,
         waits_for_room: bool = False,
         compression: str = "none",
+        window: Window | None = None,
     ) -> None:
         """Create the bag; nothing is drained before start().
 
@@ -90,6 +92,7 @@ class Recorder:
                 no write half done; without one this process writes.
             compression: of the chunks of the files, one of COMPRESSIONS; done by the recorder thread.
             waits_for_room: a disk that refuses to write pauses the recording; else it ends the recording.
+            window: there is no bag: so much stays in memory, and snapshot() writes bags below `directory`.
 
         Raises:
             TraceError: the folder exists or cannot be written, or mauve_msgs is not installed.
@@ -105,16 +108,28 @@ class Recorder:
         self._topics = topics
         self._others: dict[str, Entry] = {}
         self._refused: Counter[str] = Counter()  # of topics of other nodes
-        disk = None if keeper is None else KeptDisk(keeper, on_error=self._report)
-        self._bag = TraceBag(
-            source,
-            directory,
-            node_name=node_name,
-            on_error=self._report,
-            split=split,
-            disk=disk,
-            compression=compression,
-        )
+        self._bag: TraceBag | RecentBag
+        if window is not None:
+            self._bag = RecentBag(
+                source,
+                directory,
+                window=window,
+                node_name=node_name,
+                on_error=self._report,
+                split=split,
+                keeper=keeper,
+                compression=compression,
+            )
+        else:
+            self._bag = TraceBag(
+                source,
+                directory,
+                node_name=node_name,
+                on_error=self._report,
+                split=split,
+                disk=None if keeper is None else KeptDisk(keeper, on_error=self._report),
+                compression=compression,
+            )
         self._lock = threading.Lock()
         self._waiting: list[SentMessage] = []
         self._waiting_bytes = 0
@@ -130,6 +145,11 @@ class Recorder:
     def directory(self) -> Path:
         """The bag's folder."""
         return self._bag.directory
+
+    @property
+    def recent(self) -> RecentBag | None:
+        """What is in memory; None: it records into a bag."""
+        return self._bag if isinstance(self._bag, RecentBag) else None
 
     @property
     def recording(self) -> bool:
@@ -283,9 +303,15 @@ class Recorder:
             self._error = error
         self._report(error)
 
+    @property
+    def _on_disk(self) -> TraceBag:
+        """The bag, of which a disk has refused something."""
+        assert isinstance(self._bag, TraceBag)  # noqa: S101 - for mypy: no disk is asked by another
+        return self._bag
+
     def _interrupt(self, error: DiskError) -> None:
         """Count what is lost with the flush that failed, and what came since."""
-        lost = self._bag.interrupt(str(error))
+        lost = self._on_disk.interrupt(str(error))
         for topic in lost.keys() & self._others.keys():
             self._refused[topic] += lost.pop(topic)
         with self._lock:
@@ -307,13 +333,13 @@ class Recorder:
             self._received += more
             self._lost += more + Counter(message.topic for message in waiting)
             received, lost = self._received.copy(), self._lost.copy()
-        self._bag.skip(drain)
-        self._bag.tell_ledger(received, lost, self._others)
-        self._bag.tell_dropped(self.dropped_messages)
+        self._on_disk.skip(drain)
+        self._on_disk.tell_ledger(received, lost, self._others)
+        self._on_disk.tell_dropped(self.dropped_messages)
 
     def _write_last_words(self) -> None:
         try:
-            self._bag.write_last_words()
+            self._on_disk.write_last_words()
         except TraceError as error:
             self._report(f"the bag does not tell what it lost: {error}")
 
@@ -324,7 +350,7 @@ class Recorder:
             return
         self._try_at_s = time.monotonic() + _TRY_PERIOD_S
         try:
-            missed = self._bag.go_on()
+            missed = self._on_disk.go_on()
         except DiskError:
             self._write_last_words()
             return

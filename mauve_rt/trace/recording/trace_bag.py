@@ -4,7 +4,7 @@ import functools
 import json
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -15,12 +15,15 @@ from mauve_rt.trace.bag.recorded import ReceivedBatch, ReceivedTopic, SentMessag
 from mauve_rt.trace.bag.writer import BagWriter
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.format.cdr import Batch, encode_batch, encode_names
+from mauve_rt.trace.recording.latched import LatchedMessages
 from mauve_rt.trace.recording.ledger import (
     DROPPED_MESSAGES,
     INTERRUPTIONS,
     LEDGER,
+    SNAPSHOT,
     Entry,
     Interruption,
+    Snapshot,
 )
 from mauve_rt.trace.recording.sources import Drain, TraceWords
 
@@ -29,7 +32,6 @@ NAMES = "trace/names"
 ARCHITECTURE = "trace/architecture"
 _MOST_INTERRUPTIONS, _LONGEST_REASON = 16, 400
 _RECORD_BYTES = 48
-_KEPT_MESSAGES, _KEPT_BYTES = 16, 8 * 1024 * 1024  # of a latched topic of others, for the files to come
 _BATCH_TYPE = "mauve_msgs/msg/TraceBatch"
 _NAMES_TYPE = "mauve_msgs/msg/TraceNames"
 _ARCHITECTURE_TYPE = "mauve_msgs/msg/TraceArchitecture"
@@ -108,7 +110,7 @@ class TraceBag:
             raise
         self._names: tuple[Sequence[str], Sequence[str]] | None = None
         self._latched: dict[str, bytes] = {}  # each file begins with these
-        self._latched_of_others: dict[str, deque[SentMessage]] = {}
+        self._latched_of_others = LatchedMessages()
         self._repeated: Counter[str] = Counter()
         self._repeated_waiting: Counter[str] = Counter()  # for the next flush
         self._records_waiting = 0
@@ -167,12 +169,27 @@ class TraceBag:
         self._bag.write_batch(batch, written, ahead_ns=(log_ahead_ns, drain.realtime_ns - drain.monotonic_ns))
         return refused
 
-    def discard(self, drain: Drain) -> None:
-        """Leave out what was recorded before this bag; only how much it was gets into it."""
+    def discard(
+        self, drain: Drain, *, architecture: bytes = b"", latched: Iterable[SentMessage] = ()
+    ) -> None:
+        """Leave out what was recorded before this bag; only how much it was gets into it.
+
+        `architecture`, `latched`: of what was left out, what begins the bag: it is still in effect.
+        """
         self._last = drain
         self._dropped_flushed = sum(drain.dropped)
         self._write_names(drain)
+        if architecture:
+            self.tell_architecture(architecture, drain)
         self._write_batch(drain, b"")
+        for message in latched:
+            if self._declare(message.topic, message.type_name, message.qos, message.definition):
+                self._latched_of_others.keep(message)
+                self._repeat(message, drain)
+
+    def tell_snapshot(self, snapshot: Snapshot) -> None:
+        """Note with the next flush of what the bag is a snapshot."""
+        self._bag.set_custom_data(SNAPSHOT, json.dumps(snapshot._asdict()))
 
     def tell_architecture(self, data: bytes, drain: Drain) -> None:
         """Write a serialized mauve_msgs/msg/TraceArchitecture, unless it is the last one again."""
@@ -307,11 +324,13 @@ class TraceBag:
         for topic, data in self._latched.items():
             self._write(self._topic(topic), data, last, last.monotonic_ns)
         self._write_batch(last, b"")
-        for topic, kept in self._latched_of_others.items():
-            for message in kept:
-                self._write(topic, message.data, last, last.monotonic_ns)
-            self._repeated[topic] += len(kept)
-            self._repeated_waiting[topic] += len(kept)
+        for message in self._latched_of_others:
+            self._repeat(message, last)
+
+    def _repeat(self, message: SentMessage, last: Drain) -> None:
+        self._write(message.topic, message.data, last, last.monotonic_ns)
+        self._repeated[message.topic] += 1
+        self._repeated_waiting[message.topic] += 1
 
     def _note_flushed(self) -> None:
         self._repeated_waiting.clear()
@@ -368,17 +387,8 @@ class TraceBag:
         if not self._declare(message.topic, message.type_name, message.qos, message.definition):
             return False
         self._write(message.topic, message.data, drain, message.monotonic_ns)
-        if message.qos is not None and message.qos.transient_local:
-            self._keep(message)
+        self._latched_of_others.keep(message)
         return True
-
-    def _keep(self, message: SentMessage) -> None:
-        kept = self._latched_of_others.setdefault(message.topic, deque(maxlen=_KEPT_MESSAGES))
-        for same in [one for one in kept if one.data == message.data]:
-            kept.remove(same)
-        kept.append(message)
-        while len(kept) > 1 and sum(len(one.data) for one in kept) > _KEPT_BYTES:
-            kept.popleft()
 
     def _write(self, topic: str, data: bytes, drain: Drain, monotonic_ns: int) -> None:
         """Write what was sent at a time, mapped by a drain's clock pair."""

@@ -97,7 +97,7 @@ TEST(UserResource, IsPartOfAnArchitectureByItsPlugInName) {
   registry.shell<MapShell>("test/MapShell");
   Architecture architecture(&registry);
   architecture.add_resource("map", registry.make_resource("test/CellMap", "", {}));
-  EXPECT_THAT(registry.names("resource"), ::testing::ElementsAre("event", "test/CellMap"));
+  EXPECT_THAT(registry.names("resource"), ::testing::ElementsAre("event", "test/CellMap", "transform_tree"));
   architecture.configure();
   EXPECT_TRUE(architecture.resource("map").is_configured());
   EXPECT_THROW(architecture.publish("map"), Error);

@@ -59,6 +59,17 @@ def test_what_runs_on_which_cpu_at_which_priority_and_its_cores() -> None:
     assert lines[-3:] == ["robot: range_error: [off] the map", f"may change it: {access}", "revision 5"]
 
 
+def test_ports_and_resources_have_their_frames() -> None:
+    ports = [PortInfo(name="pose", kind=PortInfo.READ, resource="pose", service="read", frame="map")]
+    resources = [ResourceInfo(name="pose", frame="map", child_frame="base")]
+    lines = _printed(
+        ListComponents.Response(components=[ComponentInfo(name="control", ports=ports)], resources=resources)
+    )
+    at = lines.index(next(line for line in lines if "control.pose" in line))
+    assert lines[at].split() == ["control.pose", "pose.read", "in", "map,", "of", "base"]
+    assert lines[at + 1].split() == ["in", "map"]
+
+
 def test_each_port_says_what_it_is_connected_to_and_where_that_goes() -> None:
     ports = [
         PortInfo(name="goal", kind=PortInfo.READ, resource="goal", service="read"),

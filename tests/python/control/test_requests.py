@@ -89,9 +89,9 @@ def test_two_requests_have_one_digest_only_where_they_are_equal() -> None:
         Request(steps=(Step("stop", "a', target='b"),)),
         Request(steps=(Step("stop", "a\udcff"),)),
         Request(steps=(Step("stop", "a"),), dry_run=True),
-        Request(recording=RecordingOrder(start=True)),
-        Request(recording=RecordingOrder(start=True, topics=("a", "b"))),
-        Request(recording=RecordingOrder(start=True, topics=("a, b",))),
+        Request(recording=RecordingOrder(kind="start")),
+        Request(recording=RecordingOrder(kind="start", topics=("a", "b"))),
+        Request(recording=RecordingOrder(kind="start", topics=("a, b",))),
     ]
     assert len({request.digest() for request in requests}) == len(requests)
     assert requests[0].digest() == Request(steps=(Step("stop", "a"),)).digest()

@@ -25,6 +25,7 @@ from mauve_rt.graph.page import page_text
 from mauve_rt.graph.svg import GraphError, svg_element, svg_text
 
 NEEDS_DOT = pytest.mark.skipif(shutil.which("dot") is None, reason="no Graphviz")
+FRAMES = {"frame": "odom", "child_frame": "base"}
 HOSTILE = [
     'a"b',
     "</text><script>alert(1)</script>",
@@ -56,6 +57,15 @@ def component(
         "priority": 50,
     }
     return SimpleNamespace(name=name, ports=[*ports], cpus=cpus, **{**facts, **more})
+
+
+def test_frames_of_ports_and_resources_are_drawn() -> None:
+    pose = port("pose", "read", "pose")
+    vars(pose).update(FRAMES)
+    known = SimpleNamespace(name="pose", kind="shared_data", type="p/T", **FRAMES)
+    drawing = architecture_drawing("robot", [component("control", [pose])], [known])
+    assert [node.lines for node in drawing.nodes if node.kind == "resource"] == [("pose", "in odom, of base")]
+    assert [edge.lines for edge in drawing.edges] == [("in odom, of base",)]
 
 
 def ring(count: int) -> Iterator[SimpleNamespace]:

@@ -29,6 +29,8 @@ def test_bad_file_gets_one_line_with_its_place(case: str, tmp_path: Path, plugin
         text = text.replace(
             "connections:", "  point: {kind: shared_data, type: geometry_msgs/msg/Point}\nconnections:"
         )
+    if "different frames" in case:
+        text = text.replace("priority: 40", "priority: 40, frames: {count: map}")
     if case == "too many readers":
         text += "  - [source.set, count.read]\n"
     if case == "second writer":
@@ -112,6 +114,23 @@ def test_good_file_is_built_as_written(tmp_path: Path, plugin_prefix: Path) -> N
     assert values["label"] == "robot_1 of robot_2,robot_3"
     ports = {port.name: (port.resource, port.service) for port in sink.ports}
     assert ports == {"set": ("count", "read"), "count": ("", "")}
+
+
+def test_frames_have_the_name_of_the_robot(tmp_path: Path, plugin_prefix: Path) -> None:
+    text = GOOD.replace("priority: 40", "priority: 40, frames: {count: {child_frame: $(name)/base}}").replace(
+        "count: {kind: shared_data", "count: {kind: shared_data, frame: $(namespace)/odom"
+    )
+    architecture = _load(tmp_path, text)
+    ports = {port.name: port for port in architecture.components()[0].ports}
+    assert (ports["count"].frame, ports["count"].child_frame) == ("", "robot_1/base")
+    count = next(each for each in architecture.resources() if each.name == "count")
+    assert (count.frame, count.child_frame) == ("robot_1/odom", "")
+    path = tmp_path / "of_the_root.yaml"
+    path.write_text(GOOD.replace("/robot_1", "/").replace("capacity: 4", "capacity: 4, frame: $(name)"))
+    with pytest.raises(
+        ArchitectureFileError, match=r"bad frame.*\$\(name\), which is empty in namespace '/'"
+    ):
+        build(load_architecture(path), REGISTRY)
 
 
 def test_latest_values_and_events_are_built_as_written(tmp_path: Path, plugin_prefix: Path) -> None:

@@ -89,6 +89,13 @@ def test_the_papers_guidance_is_a_model() -> None:
         ("{to: W1}", "{if: has_path, to: W1}", "the last branch of 'next' has a guard"),
         ("{to: W1}]", "{to: W1}, W2]", "the branches behind 'W1' are never taken"),
         ("{write: Point2D", "{write: Point2D, read: Point2D", "expected one of read, write, call and event"),
+        ("goal: {read: Point2D}", "goal: {read: Point2D, frame: /map}", "bad frame in ports.goal of shell"),
+        ("goal: {read: Point2D}", "goal: {read: Point2D, frame: $(name)/base}", "bad frame in ports.goal of"),
+        (
+            "goal: {read: Point2D}",
+            "goal: {read: Point2D}\n      done: {event: true, child_frame: map}",
+            "bad child_frame in ports.done of shell 'GuidanceShell': expected nothing: only a port that",
+        ),
         ("default: 0.1", "default: 7", "bad default in properties.target_threshold of shell 'GuidanceShell'"),
         ("shell: GuidanceShell", "shell: GuidanceShel", "there is no shell 'GuidanceShel'; did you mean"),
         ("initial: Idle", "initial: Idl", "there is no state 'Idl'; did you mean Idle?"),

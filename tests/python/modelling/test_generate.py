@@ -69,6 +69,26 @@ def test_interfaces_of_others_are_named() -> None:
     assert found == ["geometry_msgs/msg/Point", "nav_msgs/msg/Odometry", "std_srvs/srv/Trigger"]
 
 
+def test_frames_of_ports_are_in_both_languages() -> None:
+    text = GUIDANCE.read_text(encoding="utf-8")
+    text = text.replace("goal: {read: Point2D}", "goal: {read: Point2D, optional: true, frame: map}")
+    text = text.replace("{write: Point2D, on_stop: hold}", "{write: Point2D, frame: odom, child_frame: base}")
+    text = text.replace("position: {read: Point2D}", "position: {read: Point2D, child_frame: base}")
+    model = load_model("model.yaml", text=text)
+    header = generated(model)["include/my_robot/model/guidance_shell.hpp"]
+    for port in (
+        """read_port<Point2D>("goal").optional().in_frame("map");""",
+        """write_port<Point2D>("target").in_frame("odom", "base");""",
+        """read_port<Point2D>("position").in_frame("", "base");""",
+    ):
+        assert port in header
+    module = ModuleType("my_robot_parts.model")
+    exec(python_module(model), vars(module))  # noqa: S102
+    ports = vars(module.GuidanceShell)
+    frames = {name: (ports[name].frame, ports[name].child_frame) for name in ("goal", "target", "position")}
+    assert frames == {"goal": ("map", ""), "target": ("odom", "base"), "position": ("", "base")}
+
+
 def test_a_description_cannot_leave_its_comment() -> None:
     text = GUIDANCE.read_text(encoding="utf-8")
     evil = 'description: "a \\"\\"\\" quote, and \\\\"'

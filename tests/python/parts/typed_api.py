@@ -46,6 +46,8 @@ from mauve_rt.api import (
     Transaction,
     TransactionReport,
     TransformBuffer,
+    TransformedReadPort,
+    TransformedSample,
     TransformLookup,
     TransformTree,
     WritePort,
@@ -62,6 +64,7 @@ from mauve_rt.api import (
     s_to_ns,
     service,
     times,
+    transformed_read_port,
     us_to_ns,
     write_port,
 )
@@ -92,10 +95,12 @@ class Map(Resource):
 class HoverShell(Shell):
     pose = read_port(Pose)
     start = read_port(Pose, default=Pose())
-    target = write_port(Pose, on_commit="hold", on_stop="set_zero")
+    target = write_port(Pose, on_commit="hold", on_stop="set_zero", frame="map", child_frame="base")
+    seen = read_port(Pose, frame="map", child_frame="base")
     get = call_port(Map.get)
     visit = call_port("package/Visitor")
     look = request_port(LookupTransform)
+    goal = transformed_read_port(Pose, to="map", lookup=look, frame="base")
     reached = event_port()
     height = property(1.0, unit="m", description="above ground", minimum=0.0, maximum=9.0)
     tries = property(3)
@@ -129,6 +134,11 @@ class HoverCore(Core[HoverShell]):
         assert_type(self.shell.get(3, default=1.0), float)
         self.shell.visit(print)
         assert_type(self.shell.look, RequestPort)
+        assert_type(self.shell.goal, TransformedReadPort[Pose])
+        goal = self.shell.goal.read()
+        assert_type(goal, TransformedSample[Pose])
+        if goal and goal.outcome == "done":
+            assert_type(goal.value, Pose)
         self.shell.look(LookupTransform.Request(target="map", source="base"))
         self.shell.reached.raise_()
         self.shell.target.write(3)  # type: ignore[arg-type]

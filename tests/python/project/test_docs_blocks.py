@@ -150,6 +150,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
         "mauve record start /executor images": (
             "ros/bridge/test_topic_receiver.py::test_messages_of_4_mb_are_received_or_counted",
         ),
+        "mauve record start /executor --snapshot": (
+            f"{README}every_command_is_one_that_mauve_takes",
+            "ros/cli/test_verbs.py::test_a_snapshot_by_the_command",
+        ),
         "mauve record start /executor before_lunch": (
             f"{README}every_command_is_one_that_mauve_takes",
             f"{README}service_calls_have_fields_of_their_services",

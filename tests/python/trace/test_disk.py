@@ -8,7 +8,7 @@ import shutil
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +20,11 @@ from preloaded import DiskCalls
 from rosbags.rosbag2 import Reader
 
 from mauve_rt.trace import TraceError
-from mauve_rt.trace.bag.disk import Disk, KeptDisk
+from mauve_rt.trace.bag.disk import Disk, KeptDisk, Metadata, MetadataError
 from mauve_rt.trace.bag.recorded import PackedChannel, ReceivedTopic, SentMessage, TopicQos
 from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.bag.writer import BagWriter
+from mauve_rt.trace.errors import DiskError
 from mauve_rt.trace.format.records import Kind
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reader import open_trace
@@ -412,6 +413,62 @@ def test_a_write_error_that_ends_is_a_pause(tmp_path: Path, calls: DiskCalls):
         until(lambda before=fed.recorder.message_count: fed.recorder.message_count > before, "a flush")
     assert fed.recorder.stop()
     fed.assert_told("Input/output error", count=2)
+
+
+class Refusing(Disk):
+    """Refuses what is written once a file was, while `refuses`."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.refuses = self.has_written = False
+
+    def write(
+        self,
+        descriptor: int,
+        parts: Sequence[bytes | bytearray],
+        offset: int,
+        *,
+        size: int | None = None,
+        metadata: Metadata | None = None,
+        sync: bool = False,
+    ) -> None:
+        if not self.refuses:
+            super().write(descriptor, parts, offset, size=size, metadata=metadata, sync=sync)
+            return
+        if self.has_written:
+            raise OSError(errno.EIO, os.strerror(errno.EIO))
+        super().write(descriptor, parts, offset, size=size)
+        self.has_written = True
+        raise MetadataError(errno.EIO, os.strerror(errno.EIO))
+
+
+@pytest.mark.parametrize("end", ["go_on", "room", "abort"])
+def test_no_file_stays_newer_than_metadata_when_the_old_end_is_put_back_late(tmp_path: Path, end: str):
+    disk = Refusing()
+    bag = BagWriter(tmp_path / "bag", disk=disk, keeps_room=True)
+    bag.add_topic("/words", TEXT)
+    for number in range(2):
+        bag.write("/words", number, text_of(10))
+        bag.flush()
+    disk.refuses = True
+    bag.write("/words", 2, text_of(3000))
+    with pytest.raises(DiskError, match="could not be put back either"):
+        bag.flush()
+    assert bag.drop_waiting() == {"/words": 1}
+    with pytest.raises(DiskError):
+        bag.go_on(lambda: None)
+    assert not (tmp_path / "bag" / "bag_1.mcap").exists()
+    assert examine_bag(tmp_path / "bag").damages(), "the disk holds more than was told"
+    disk.refuses = False
+    if end == "go_on":
+        bag.go_on(lambda: bag.write("/words", 3, text_of(10)))
+    if end == "room":
+        bag.write_into_room()
+        assert examine_bag(tmp_path / "bag").damages() == []
+    bag.abort()
+    state = examine_bag(tmp_path / "bag")
+    assert state.damages() == []
+    assert [one.messages for one in state.topics()] == [3 if end == "go_on" else 2]
 
 
 class Others:

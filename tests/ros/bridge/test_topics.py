@@ -163,6 +163,46 @@ def test_a_message_that_is_too_large_is_refused_and_counted(bind: Bind, graph: A
     assert bound.received("word", String).data == "short"
 
 
+@pytest.mark.parametrize(
+    ("of_class", "capacities", "filled"),
+    [
+        (LaserScan, "", ""),
+        (JointState, "capacity: {name: 1, position: 1, velocity: 1, effort: 1}, ", "robot/base"),
+    ],
+    ids=["only Python has the type", "a library has the type"],
+)
+def test_a_message_in_another_frame_is_refused_counted_and_explained(
+    bind: Bind, graph: Any, of_class: Any, capacities: str, filled: str
+) -> None:
+    bound = bind(f"""\
+  value: {{kind: shared_data, type: sensor_msgs/msg/{of_class.__name__}, frame: robot/base,
+           {capacities}topic: {{name: value, direction: subscribe}}}}
+""")
+    voice = graph.voice(of_class, "/robot/value")
+    value = of_class()
+
+    def told(frame: str, report: Callable[[], int]) -> None:
+        value.header.frame_id = frame
+
+        def is_told() -> bool:
+            voice.publish(value)
+            return report() > 0
+
+        graph.spin_until(is_told, frame)
+
+    told("robot/base", lambda: bound.report("/robot/value").passed)
+    told("map", lambda: bound.report("/robot/value").refused)
+    report = bound.report("/robot/value")
+    assert report.refusal == "header.frame_id is 'map', expected 'robot/base'"
+    assert bound.received("value", of_class).header.frame_id == "robot/base"
+    resource = next(each for each in bound.runtime.described_resources() if each.name == "value")
+    assert resource.refused_values >= 1
+    assert resource.why_refused_value == report.refusal
+    passed = report.passed
+    told("", lambda: bound.report("/robot/value").passed - passed)
+    assert bound.received("value", of_class).header.frame_id == filled
+
+
 def test_an_event_is_an_empty_message_or_a_true_one(bind: Bind, graph: Any) -> None:
     bound = bind("""\
   bump: {kind: event, type: std_msgs/msg/Empty, topic: {name: bump, direction: publish}}

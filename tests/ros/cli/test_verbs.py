@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -165,3 +166,25 @@ def test_a_domain_without_an_executor_is_told(environment: dict[str, str]) -> No
     assert done.returncode == 2
     expected = "no executor /executor: none is seen at all in ROS_DOMAIN_ID 101"
     assert done.stderr == f"mauve: {expected}; is it started, in this domain?\n"
+
+
+def test_a_snapshot_by_the_command(mauve: Mauve, tmp_path: Path) -> None:
+    refused = mauve("record", "snapshot", NODE)
+    assert refused.returncode == 1
+    assert "needs a recording into memory (snapshot_s), and nothing is being recorded" in refused.stderr
+    bad = mauve("record", "start", NODE, "--snapshot", "-3")
+    assert bad.returncode == 1
+    assert "bad snapshot_s: expected 0 (record into a bag) or 1 to 1e+06 s, found -3" in bad.stderr
+    alone = mauve("record", "start", NODE, "--snapshot-mb", "5")
+    assert "bad snapshot_bytes: it limits the memory of snapshot_s; give snapshot_s, too" in alone.stderr
+    assert mauve("record", "start", NODE, "--snapshot", "30").returncode == 0
+    written = mauve("record", "snapshot", NODE, "--cause", "it shook", "--json")
+    assert written.returncode == 0
+    bag = json.loads(written.stdout)["bag"]
+    try:
+        checked = mauve("trace", "check", bag)
+        assert checked.returncode == 0, checked.stdout
+        assert "note: snapshot of " in checked.stdout
+    finally:
+        shutil.rmtree(bag)
+    assert "the recording into memory has ended" in mauve("record", "stop", NODE).stdout

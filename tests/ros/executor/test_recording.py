@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from bag_kills import has_ended
 from bag_rules import assert_rosbag2_reads
@@ -22,7 +23,7 @@ from std_msgs.msg import Float64, UInt8MultiArray, UInt64
 
 import mauve_rt.trace
 from mauve_msgs.msg import ReconfigurationStep, ReplyCode
-from mauve_msgs.srv import Reconfigure, ReplaceCore, StartRecording, StopRecording
+from mauve_msgs.srv import Reconfigure, ReplaceCore, StartRecording, StopRecording, WriteSnapshot
 from mauve_rt.trace.bag.repair import examine_bag
 from mauve_rt.trace.reading.check import check_bag
 from mauve_rt.trace.reading.reconfigurations import reconfigurations
@@ -49,6 +50,10 @@ def start(graph: Any, **fields: Any) -> Any:
 
 def stop(graph: Any) -> Any:
     return graph.ask(StopRecording, f"{EXECUTOR}/stop_recording")
+
+
+def snapshot(graph: Any, **fields: Any) -> Any:
+    return graph.ask(WriteSnapshot, f"{EXECUTOR}/write_snapshot", **fields)
 
 
 def topics_of(bag: Path) -> dict[str, int]:
@@ -391,6 +396,112 @@ def test_no_request_waits_for_a_disk_on_which_a_bag_is_made(
         goes_on.unlink()
         assert examine_bag(tmp_path / bag).is_finished
     assert "Traceback" not in executor.output
+
+
+def test_the_last_seconds_are_written_on_request(executor: ExecutorProcess, graph: Any, tmp_path: Path):
+    voice = graph.node.create_publisher(Float64, "/robot_1/talk", 10)
+    reply = start(graph, snapshot_s=1.5, topics=["/robot_1/talk:std_msgs/msg/Float64"])
+    assert reply.success, reply.message
+    assert f"the last 1.5 s, 268,435,456 bytes at most; snapshots are created in {tmp_path}" in reply.message
+    graph.spin_until(lambda: voice.get_subscription_count() > 0, "the recorder's subscription")
+    begin_s = time.monotonic()
+    graph.spin_until(lambda: time.monotonic() - begin_s > 2.0, "more than the window")
+    events = graph.hear_events(EXECUTOR)
+    first = snapshot(graph, bag="first", cause="it shook")
+    assert first.success, first.message
+    assert first.bag == str(tmp_path / "first")
+    assert f"messages are in {tmp_path / 'first'}: snapshot of " in first.message
+    again = snapshot(graph, bag="first")
+    assert (again.success, again.code) == (False, ReplyCode.PREPARE_FAILED)
+    assert "exists already" in again.message
+    outside = snapshot(graph, bag="../elsewhere")
+    assert (outside.success, outside.code) == (False, ReplyCode.INVALID)
+    by_time: list[Any] = []
+
+    def has_message() -> bool:
+        voice.publish(Float64(data=7.0))
+        by_time.append(snapshot(graph))
+        assert by_time[-1].success, by_time[-1].message
+        return "/robot_1/talk" in topics_of(Path(by_time[-1].bag))
+
+    graph.spin_until(has_message, "a message of another node in a snapshot")
+    assert Path(by_time[-1].bag).name.startswith("snapshot_2")
+    graph.spin_until(lambda: any("write_snapshot first" in each.request for each in events), "the event")
+    stopped = stop(graph)
+    assert stopped.success, stopped.message
+    assert "the recording into memory has ended" in stopped.message
+    assert len(list(tmp_path.glob("*/metadata.yaml"))) == 1 + len(by_time)
+    assert snapshot(graph).code == ReplyCode.NOT_RUNNING
+    for bag in (tmp_path / "first", Path(by_time[-1].bag)):
+        assert not [finding for finding in check_bag(bag) if finding.kind != "note"]
+        assert_rosbag2_reads(bag)
+        trace = mauve_rt.trace.open(bag)
+        assert trace.lost == 0
+        assert {one.name for one in trace.architecture} >= {"counter"}
+        held_ns = np.ptp(trace.of("counter")["time_ns"])
+        assert held_ns > 1e9
+    numbers = counts_of(tmp_path / "first")
+    assert len(numbers) == abs(numbers[-1] - numbers[0]) + 1, "none is missing in between"
+    assert start(graph, bag="bag").success
+    refused = snapshot(graph)
+    assert (refused.success, refused.code) == (False, ReplyCode.NOT_RUNNING)
+    assert "the recording writes a bag" in refused.message
+    assert stop(graph).success
+
+
+def test_snapshots_by_the_parameters_of_the_executor(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    folder = tmp_path / "kept"
+    settings = ("bag_snapshot_s:=60.0", "bag_snapshot_bytes:=100000", f"bag:={folder}")
+    arguments = [word for setting in settings for word in ("-p", setting)]
+    executor = start_executor("-p", f"architecture:={architecture}", *arguments)
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    replies: list[Any] = []
+
+    def is_short() -> bool:
+        replies.append(snapshot(graph))
+        return "holds no more of 60 s" in str(replies[-1].message)
+
+    graph.spin_until(is_short, "a full memory")
+    assert replies[-1].success
+    assert Path(replies[-1].bag).parent == folder
+    assert sum(file.stat().st_size for file in Path(replies[-1].bag).glob("*.mcap")) < 400_000
+    texts = [finding.text for finding in check_bag(Path(replies[-1].bag))]
+    assert [text for text in texts if "snapshot_bytes, 100,000" in text]
+    executor.end(signal.SIGTERM)
+    assert "Traceback" not in executor.output
+
+
+def test_a_disk_that_hangs_at_a_snapshot_holds_up_its_reply_only(
+    architecture: Path, start_executor: Starter, graph: Any, tmp_path: Path
+):
+    hangs, goes_on = tmp_path / "hangs", tmp_path / "goes_on"
+    preloaded = shared_library(tmp_path / "mkdir.c", HANGING_MKDIR)
+    environment = {"LD_PRELOAD": preloaded, "MKDIR_HANGS": str(hangs), "MKDIR_GOES_ON": str(goes_on)}
+    start_executor("-p", f"architecture:={architecture}", "-p", f"bags:={tmp_path}", environment=environment)
+    counts = graph.hear(Float64, "/robot_1/count")
+    graph.spin_until(lambda: len(counts) > 2, "the components to run")
+    assert start(graph, snapshot_s=5.0).success
+    client = graph.node.create_client(WriteSnapshot, f"{EXECUTOR}/write_snapshot")
+    graph.spin_until(client.service_is_ready, "the service")
+    answer = client.call_async(WriteSnapshot.Request(bag="hanging"))
+    graph.spin_until(hangs.exists, "the disk to hang")
+    reply = graph.ask(
+        ReplaceCore, f"{EXECUTOR}/replace_core", component="counter", core="executor_tests/Backwards"
+    )
+    assert reply.success, reply.message
+    busy = snapshot(graph, bag="other")
+    assert (busy.success, busy.code) == (False, ReplyCode.ALREADY_RUNNING)
+    graph.spin_until(answer.done, "the reply")
+    assert answer.result().code == ReplyCode.TIMEOUT
+    assert "is still being written after 2 s" in answer.result().message
+    goes_on.touch()
+    bag = tmp_path / "hanging"
+    graph.spin_until(lambda: snapshot(graph, bag="other").success, "the end of the first snapshot")
+    assert not [finding for finding in check_bag(bag) if finding.kind != "note"]
+    assert stop(graph).success
 
 
 def test_each_message_is_recorded_once(executor: ExecutorProcess, graph: Any, tmp_path: Path):

@@ -20,10 +20,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from ros_processes import keep_interpreter
 from std_msgs.msg import Float64
 
+import mauve_rt.trace
 from mauve_msgs.msg import ArchitectureState, ReconfigurationEvent, ReconfigurationStep, SupervisorDecision
 from mauve_msgs.srv import ListComponents, ListRules, LoadRules, Reconfigure, ReplaceCore, ResetRule, Stop
 from mauve_msgs.srv import Start as StartComponent
 from mauve_rt.control.requests import Code
+from mauve_rt.trace.bag.repair import examine_bag
+from mauve_rt.trace.recording.ledger import snapshot_of
 
 NODE = "/robot_1/executor"
 USUAL, SAFE = "executor_tests/Counter", "executor_tests/Backwards"
@@ -156,6 +159,40 @@ def start(files: tuple[Path, Path], graph: Any, start_executor: Callable[..., An
     yield started
     for robot in robots:
         robot.voice.close()
+
+
+def test_a_rule_writes_a_snapshot_when_its_action_begins(
+    start: Start, files: tuple[Path, Path], graph: Any, tmp_path: Path
+):
+    files[1].write_text(f"{RULES}    snapshot: true\n", encoding="utf-8")
+    robot = start("-p", f"bag:={tmp_path / 'kept'}", "-p", "bag_snapshot_s:=30.0")
+    robot.await_said("armed")
+    robot.await_core(USUAL)
+    robot.voice.off()
+    robot.await_core(SAFE)
+    robot.process.await_output("rule quiet: its snapshot is written to")
+    is_there = lambda: [bag for bag in (tmp_path / "kept").glob("snapshot_*") if _is_complete(bag)]  # noqa: E731
+    graph.spin_until(is_there, "the snapshot")
+    trace = mauve_rt.trace.open(is_there()[0])
+    assert "do" in [each.decision for each in trace.decisions if each.rule == "quiet"], "the cause is in it"
+    assert trace.lost == 0
+
+
+def test_a_rule_without_a_recording_into_memory_acts_all_the_same(
+    start: Start, files: tuple[Path, Path], graph: Any
+):
+    files[1].write_text(f"{RULES}    snapshot: true\n", encoding="utf-8")
+    robot = start()
+    robot.await_said("armed")
+    robot.await_core(USUAL)
+    robot.voice.off()
+    robot.await_core(SAFE)
+    robot.process.await_output("rule quiet: no snapshot: a snapshot needs a recording into memory")
+
+
+def _is_complete(bag: Path) -> bool:
+    found = snapshot_of(examine_bag(bag).custom_data)
+    return found is not None and found.is_complete
 
 
 def test_acts_undoes_and_tells(start: Start, graph: Any):

@@ -29,7 +29,7 @@ from mauve_msgs.msg import (
     ReplyCode,
     SupervisorDecision,
 )
-from mauve_msgs.srv import Reconfigure
+from mauve_msgs.srv import Reconfigure, WriteSnapshot
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.node.supervisor.node import Supervisor
 from mauve_rt.supervision.rules import RulesFile
@@ -61,7 +61,9 @@ class StandIn:
         latched = QoSProfile(depth=1, durability=LATCHED)
         self._state = self.node.create_publisher(ArchitectureState, "~/state", latched)
         self._voice = self.node.create_publisher(PeerMessage, "radio/in", 10)
+        self.snapshots: list[Any] = []
         self.node.create_service(Reconfigure, "~/reconfigure", self._reconfigure)
+        self.node.create_service(WriteSnapshot, "~/write_snapshot", self._write_snapshot)
         self.node.create_timer(0.1, self._speak)
 
     def tell(self) -> None:
@@ -74,6 +76,11 @@ class StandIn:
     def _speak(self) -> None:
         if self.talking:
             self._voice.publish(PeerMessage(sender="robot_2", sequence=self.number))
+
+    def _write_snapshot(self, request: Any, response: Any) -> Any:
+        self.snapshots.append(request)
+        response.success = True
+        return response
 
     def _reconfigure(self, request: Any, response: Any) -> Any:
         self.requests.append(request)
@@ -179,6 +186,18 @@ def test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back(graph: 
     assert do.silence_s > 0.5
     assert do.revision == 1
     assert do.stamp.sec > 0
+
+
+def test_a_rule_asks_the_executor_for_a_snapshot_when_its_action_begins(graph: Graph, rules: Path):
+    rules.write_text(f"{RULES.rstrip()}\n    snapshot: true\n", encoding="utf-8")
+    stand_in, decisions = supervised(graph, rules)
+    graph.spin(1.0)
+    stand_in.talking = False
+    graph.until(lambda: "done" in said(decisions) and len(stand_in.snapshots) > 0)
+    stand_in.talking = True
+    graph.until(lambda: said(decisions).count("done") == 2)
+    assert [each.requested_by for each in stand_in.snapshots] == ["/robot_1/supervisor"]
+    assert stand_in.snapshots[0].cause.startswith("link_lost: nothing on /robot_1/radio/in for 0.")
 
 
 def test_the_value_of_a_field_and_a_tree(graph: Graph, rules: Path):

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A component that was not there; it arrives STOPPED.
 #include "change/steps/step_kind.hpp"
+#include "parts/lookup.hpp"
 
 namespace mauve {
 
@@ -36,6 +37,13 @@ constexpr StepKind steps::add_component{
           std::unique_ptr<CoreBase> fallback = std::move(wanted.fallback);
           DraftComponent& added = draft.add_component(step.target, rest.settings);
           added.fresh = std::move(parts);
+          for (const auto& [port, frames] : rest.frames) find_port(*added.fresh.shell, port, step.target);
+          added.component->declare_frames(rest.frames);
+          try {
+            added.component->give_frames(*added.fresh.shell);
+          } catch (const Error& failure) {
+            rethrow_as_of(failure, step.target, draft.step());
+          }
           added.component->allow(rest.alternatives, rest.reconfigurable);
           if (fallback == nullptr && !rest.fallback.empty())
             fallback = draft.registry().make_core(rest.fallback);

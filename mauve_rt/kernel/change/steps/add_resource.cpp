@@ -23,7 +23,8 @@ constexpr StepKind steps::add_resource{
           auto resource = wanted.by_kind
                               ? draft.registry().make_resource(wanted.kind, wanted.type, wanted.parameters)
                               : take(wanted.resource);
-          draft.add_resource(step.target, std::move(resource), wanted.topic, wanted.longest_hold_ns);
+          draft.add_resource(step.target, std::move(resource), wanted.topic, wanted.longest_hold_ns,
+                             wanted.frames);
         }};
 
 }  // namespace mauve

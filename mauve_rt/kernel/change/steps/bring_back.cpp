@@ -47,7 +47,9 @@ constexpr StepKind steps::bring_back{
       Component& component = *added.component;
       component.allow(hung->alternatives(), hung->is_reconfigurable());
       if (auto fallback = hung->another_fallback()) component.set_fallback(std::move(fallback));
+      component.declare_frames(hung->declared_frames());
       added.fresh.shell = another(step.target, hung->shell());
+      component.give_frames(*added.fresh.shell);
       added.fresh.fsm = another(step.target, probation->old_fsm());
       added.wires = wires;
       for (const ShownProperty& property : hung->shown().properties)

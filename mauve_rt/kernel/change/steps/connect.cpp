@@ -27,7 +27,8 @@ void connect_port(Draft& draft, DraftComponent& component, const std::string& po
   component.wires.emplace(port_name, Wire{.resource = resource_name,
                                           .service = &service,
                                           .step = draft.step(),
-                                          .use = draft.resource(resource_name).use()});
+                                          .use = draft.resource(resource_name).use(),
+                                          .frames = port.frames()});
 }
 
 }  // namespace

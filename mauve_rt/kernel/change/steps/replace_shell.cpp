@@ -13,7 +13,16 @@ constexpr StepKind steps::replace_shell{
       std::unique_ptr<Shell> shell = brings<Shell>(step) ? take(value_of<std::unique_ptr<Shell>>(step))
                                                          : draft.registry().make_shell(step.name);
       DraftComponent& changed = replacing(draft, step.target);
+      try {
+        changed.component->give_frames(*shell);
+      } catch (const Error& failure) {
+        rethrow_as_of(failure, step.target, draft.step());
+      }
       changed.fresh.shell = std::move(shell);
+      for (auto& [name, wire] : changed.wires) {
+        const PortBase* const port = changed.fresh.shell->find_port(name);
+        wire.frames = port == nullptr ? nullptr : port->frames();
+      }
       changed.shell_step = draft.step();
       // What steps before have set, they have set of this shell too.
       const std::map<std::string, DraftProperty> set = changed.properties;

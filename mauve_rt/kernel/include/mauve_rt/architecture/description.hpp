@@ -35,6 +35,7 @@ struct ResourceFacts {
   std::string type;
   std::vector<ServiceFacts> services;
   time_ns_t longest_hold_ns{0};  // of its lock; 0: not declared
+  Frames frames{};
   bool operator==(const ResourceFacts&) const = default;
 };
 

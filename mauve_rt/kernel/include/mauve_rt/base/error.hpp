@@ -38,6 +38,8 @@ enum class ErrorCode : std::uint16_t {
   unknown_type,
   /// Two elements that belong together have different types. Give both elements the type that the message expects.
   type_mismatch,
+  /// Two connected elements declare different frames. Connect another resource, read it by a TransformedReadPort, or correct a frame.
+  frame_mismatch,
   /// A number is outside its range. Choose a number within the range that the message names.
   out_of_range,
   /// The name is already in use. Choose another name, or remove the element that has it.
@@ -105,6 +107,7 @@ inline constexpr auto kErrors = std::to_array<ErrorWords>({
     {ErrorCode::unknown_property, "unknown_property", "INVALID"},
     {ErrorCode::unknown_type, "unknown_type", "INVALID"},
     {ErrorCode::type_mismatch, "type_mismatch", "INVALID"},
+    {ErrorCode::frame_mismatch, "frame_mismatch", "INVALID"},
     {ErrorCode::out_of_range, "out_of_range", "INVALID"},
     {ErrorCode::duplicate_name, "duplicate_name", "INVALID"},
     {ErrorCode::loop_without_wait, "loop_without_wait", "PREPARE_FAILED"},

@@ -28,6 +28,7 @@ struct ComponentParts {
   std::vector<std::string> alternatives{};
   std::string fallback{};
   bool reconfigurable{true};
+  std::map<std::string, Frames> frames{};  // by port, in addition to those that the shell declares
 };
 
 /// A component to be added: its parts by name, or as objects.
@@ -47,6 +48,7 @@ struct NewResource {
   std::unique_ptr<Resource> resource{};
   TopicBinding topic{TopicBinding::none};
   time_ns_t longest_hold_ns{0};
+  Frames frames{};
 };
 
 /// A core to be put in on probation: by the step's name, or as an object.
@@ -165,12 +167,13 @@ class Transaction {
   /// It is parked, its outputs written as on a stop, its ports disconnected.
   Transaction& remove_component(const std::string& name);
   /// `topic`: as Architecture::publish() or Resource::bind_input(). `longest_hold_ns`: as
-  /// Resource::set_longest_hold_ns(); 0: what the resource's own code declares.
+  /// Resource::set_longest_hold_ns(); 0: what the resource's own code declares. `frames`: as Resource::set_frames().
   Transaction& add_resource(const std::string& name, const std::string& kind, const std::string& type,
                             ResourceParameters parameters = {}, TopicBinding topic = TopicBinding::none,
-                            time_ns_t longest_hold_ns = 0);
+                            time_ns_t longest_hold_ns = 0, const Frames& frames = {});
   Transaction& add_resource(const std::string& name, std::unique_ptr<Resource> resource,
-                            TopicBinding topic = TopicBinding::none, time_ns_t longest_hold_ns = 0);
+                            TopicBinding topic = TopicBinding::none, time_ns_t longest_hold_ns = 0,
+                            const Frames& frames = {});
   /// Refused while a port is connected to it.
   Transaction& remove_resource(const std::string& name);
   /// As Task::start: in the initial state, on the grid of `clock_ns` or of the deployment.

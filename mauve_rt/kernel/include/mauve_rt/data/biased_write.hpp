@@ -8,6 +8,7 @@
 #include "mauve_rt/base/biased_mutex.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/frames.hpp"
 #include "mauve_rt/data/service.hpp"
 
 namespace mauve {
@@ -31,13 +32,13 @@ class BiasedWrite final : public WriteService<T> {
     return put(value, time_ns, &seat);
   }
   TryWrite try_write(const T& value, time_ns_t time_ns) noexcept override {
-    {
-      if (!mutex_.try_lock()) return TryWrite::busy;
-      const LockGuard lock(mutex_, std::adopt_lock);
-      if (!floor_.admits(time_ns) || !owner_.take(value, time_ns)) return TryWrite::done;
+    if constexpr (kIsCopied) {
+      if (const Frames* const frames = expected_frames(); frames != nullptr) [[unlikely]] {
+        T framed = value;
+        return fill_frames(framed, *frames) ? try_write_now(framed, time_ns) : TryWrite::done;
+      }
     }
-    owner_.written(time_ns);
-    return TryWrite::done;
+    return try_write_now(value, time_ns);
   }
   T* borrow(BiasedMutex::Seat* seat) noexcept override {
     if constexpr (kIsLarge<T>) {
@@ -47,7 +48,7 @@ class BiasedWrite final : public WriteService<T> {
     return nullptr;
   }
   bool publish(T& place, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept override {
-    if (owner_.limits().admits(place)) return publish_admitted(place, time_ns, seat);
+    if (owner_.limits().admits(place) && set_frames(place)) return publish_admitted(place, time_ns, seat);
     give_back(place, seat);
     return false;
   }
@@ -75,6 +76,27 @@ class BiasedWrite final : public WriteService<T> {
   BiasedMutex& mutex() MAUVE_RT { return mutex_; }
 
  private:
+  /// Whether a value without frames is written as a copy that has them; a large one has them written into its place.
+  static constexpr bool kIsCopied = HasFrame<T> && !kIsLarge<T>;
+
+  const Frames* expected_frames() const noexcept { return owner_.frame_guard().expected(); }
+  /// Whether a message is in the resource's frames, which it gets where it names none.
+  bool set_frames(T& value) noexcept {
+    if constexpr (HasFrame<T>) {
+      if (const Frames* const frames = expected_frames(); frames != nullptr) [[unlikely]]
+        return owner_.frame_guard().admits(frame_ids(value)) && fill_frames(value, *frames);
+    }
+    return true;
+  }
+  TryWrite try_write_now(const T& value, time_ns_t time_ns) noexcept {
+    {
+      if (!mutex_.try_lock()) return TryWrite::busy;
+      const LockGuard lock(mutex_, std::adopt_lock);
+      if (!floor_.admits(time_ns) || !owner_.take(value, time_ns)) return TryWrite::done;
+    }
+    owner_.written(time_ns);
+    return TryWrite::done;
+  }
   bool publish_admitted(T& place, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
     if constexpr (kIsLarge<T>) {
       {
@@ -94,8 +116,18 @@ class BiasedWrite final : public WriteService<T> {
       T* const place = owner_.limits().admits(value) ? borrow(seat) : nullptr;
       if (place == nullptr) return false;
       *place = value;  // not under the lock
-      return publish_admitted(*place, time_ns, seat);
+      if (set_frames(*place)) return publish_admitted(*place, time_ns, seat);
+      give_back(*place, seat);
+      return false;
+    } else if constexpr (kIsCopied) {
+      if (expected_frames() != nullptr) [[unlikely]] {
+        T framed = value;
+        return set_frames(framed) && put_now(framed, time_ns, seat);
+      }
     }
+    return put_now(value, time_ns, seat);
+  }
+  bool put_now(const T& value, time_ns_t time_ns, BiasedMutex::Seat* seat) noexcept {
     {
       const BiasedMutex::Hold hold(mutex_, seat);
       if (!floor_.admits(time_ns)) return true;

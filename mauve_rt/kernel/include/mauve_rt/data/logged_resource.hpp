@@ -36,14 +36,21 @@ class LoggedResource : public Base {
     return values() * value_bytes(message_shape<T>(), limits_.capacities());
   }
   std::uint64_t lost_writes() const noexcept override { return log_.lost(); }
-  std::uint64_t refused_values() const noexcept override { return limits_.refused(); }
-  std::string why_refused_value() const override { return limits_.refusal(); }
+  std::uint64_t refused_values() const noexcept override {
+    return limits_.refused() + Base::refused_values();
+  }
+  std::string why_refused_value() const override {
+    const std::string of_size = limits_.refusal();
+    const std::string of_frame = Base::why_refused_value();
+    return of_size + (of_size.empty() || of_frame.empty() ? "" : "; ") + of_frame;
+  }
   std::string why_refused(std::span<const std::byte> message) const override {
     const auto value = limits_.make();
     TooLong found;
     CdrReader reader(message);
     reader.explain(found);
-    if (reader.get(*value) || found.size == 0) return Base::why_refused(message);
+    if (reader.get(*value)) return why_refused_whole(*value, message);
+    if (found.size == 0) return Base::why_refused(message);
     const auto capacity = limits_.capacities().find(found.path);
     if (capacity == limits_.capacities().end())
       return found.path + " has " + std::to_string(found.size) + " elements, more than the struct holds";
@@ -54,6 +61,11 @@ class LoggedResource : public Base {
   /// Of the sequences of its values. [rt]
   SequenceLimits<T>& limits() MAUVE_RT { return limits_; }
   const SequenceLimits<T>& limits() const MAUVE_RT { return limits_; }
+  /// Why a message was refused that is whole. [non-rt]
+  virtual std::string why_refused_whole(const T& value, std::span<const std::byte> message) const {
+    const std::string of_frame = this->frame_guard().why_refused(frame_ids(value));
+    return of_frame.empty() ? Base::why_refused(message) : of_frame;
+  }
   /// After a write that succeeded. [rt] Under the lock of the writers.
   void log(const T& value, time_ns_t time_ns) MAUVE_RT { log_.put(value, time_ns); }
 

@@ -28,6 +28,12 @@ class ReadPort final : public PortBase {
     make_optional();
     return *this;
   }
+  /// Its values are in this frame; of poses and transforms `child` is the frame whose pose they are. [setup]
+  /// Throws Error (invalid_argument): a bad name.
+  ReadPort& in_frame(const std::string& frame, const std::string& child = {}) {
+    declare_frames({.frame = frame, .child_frame = child});
+    return *this;
+  }
 
   /// Value, status and writer's time. [rt]
   /// What is gone from its resource is not given twice: a ring's read with status old holds the default.
@@ -227,6 +233,12 @@ class WritePort final : public PortBase {
   /// Lets it go unconnected. [setup]
   WritePort& optional() noexcept {
     make_optional();
+    return *this;
+  }
+  /// Its values are in this frame; of poses and transforms `child` is the frame whose pose they are. [setup]
+  /// Throws Error (invalid_argument): a bad name.
+  WritePort& in_frame(const std::string& frame, const std::string& child = {}) {
+    declare_frames({.frame = frame, .child_frame = child});
     return *this;
   }
 

@@ -14,6 +14,7 @@
 #include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/data/frames.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/output_watch.hpp"
 #include "mauve_rt/data/port_cell.hpp"
@@ -61,7 +62,7 @@ struct ConnectedTo {
 /// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
 /// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
 /// | context_    | [setup]                        | component                 | -                                    |
-/// | optional_   | [setup]                        | any                       | -                                    |
+/// | optional_, frames_ | [setup]                 | any                       | -                                    |
 /// | special_    | see below                      | component                 | acq_rel: its zeros stay last; who sees a bit sees what it stands for |
 /// | is_safe_    | who writes its last output     | same                      | Task::outputs_: one at a time        |
 /// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
@@ -90,6 +91,11 @@ class PortBase {
   bool is_required() const MAUVE_RT { return kind_ == PortKind::call || !optional_; }
   /// Lets it go unconnected; a call port stays required. [setup]
   void make_optional() noexcept { optional_ = true; }
+  /// The frames of its values; nullptr: none is declared. [rt]
+  const Frames* frames() const MAUVE_RT { return frames_; }
+  /// Of a port that reads or writes. [setup] Throws Error: invalid_argument (a name, another kind of port), frame_mismatch (it
+  /// declares another frame already).
+  void declare_frames(const Frames& frames);
   /// [rt]
   bool is_connected() const MAUVE_RT { return connection().service != nullptr; }
   /// Whether its service has given it a place of its own: ServiceBase::seat(). [rt]
@@ -101,7 +107,7 @@ class PortBase {
   ConnectedTo connected_to() const;
 
   /// Checks that a service fits, without regard to how many ports it has. [non-rt]
-  /// Throws Error (type_mismatch): kind, type, or the C++ type behind an equal name.
+  /// Throws Error: type_mismatch (kind, type, or the C++ type behind an equal name), frame_mismatch.
   void check(const ServiceBase& service) const;
   /// Checks a service and makes the connection to it, to be swapped in. [non-rt] Throws as check().
   PortConnection prepare(ServiceBase& service, const std::string& resource_name) const;
@@ -110,7 +116,7 @@ class PortBase {
   void swap(PortConnection& connection) MAUVE_RT;
 
   /// check, prepare and swap. [non-rt] The component is parked.
-  /// Throws Error: type_mismatch, invalid_argument (the service takes no more ports).
+  /// Throws Error: type_mismatch, frame_mismatch, invalid_argument (the service takes no more ports).
   void connect(ServiceBase& service, const std::string& resource_name);
   /// [non-rt] The component is parked.
   void disconnect() noexcept;
@@ -251,6 +257,8 @@ class PortBase {
 
   /// Throws Error (type_mismatch): its struct is not the service's.
   void check_layout(const ServiceBase& service) const;
+  /// Throws Error (frame_mismatch): its resource declares another frame.
+  void check_frames(const ServiceBase& service) const;
   const PortConnection& connection() const noexcept {
     return is_previewed() ? stand_in<PortBase>().connection_ : connection_;
   }
@@ -262,6 +270,7 @@ class PortBase {
   PortConnection connection_;
   const Context* context_{nullptr};
   bool optional_{false};
+  const Frames* frames_{nullptr};
   Atomic<std::uint32_t> special_{0};
   bool is_safe_{false};
   bool is_counted_{true};  // among the ports of its service

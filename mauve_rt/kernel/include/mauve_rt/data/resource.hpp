@@ -16,6 +16,7 @@
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/trace.hpp"
+#include "mauve_rt/data/frames.hpp"
 #include "mauve_rt/data/number_place.hpp"
 #include "mauve_rt/data/service.hpp"
 
@@ -117,6 +118,7 @@ enum class TopicBinding : std::uint8_t { none, publish, subscribe };
 /// | use_     | ordinary threads | the same          | use_mutex_                                                     |
 /// | stop_ns_ | begin_stop()     | who sends samples | relaxed: before the write, so who has the sample sees the time |
 /// | log_     | [setup]          | anyone            | its own: log.hpp                                               |
+/// | frame_guard_ | its own      | writers           | its own: frames.hpp                                            |
 /// | stops_   | end_stop()       | who sends samples | release/acquire: who sees the count finds the sample           |
 class Resource : public ConfigurablePart, public std::enable_shared_from_this<Resource> {
  public:
@@ -146,6 +148,13 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   /// For the timing analysis: nothing enforces it. Before ports are connected. [setup]
   /// Throws Error (out_of_range): below 0, or above kLongest.
   void set_longest_hold_ns(time_ns_t longest_hold_ns);
+
+  /// The frames of its values, before ports are connected; a component's ports may declare them, too. [setup]
+  /// Throws Error (invalid_argument): a bad name.
+  void set_frames(const Frames& frames);
+  /// What it checks of the messages that are written. [rt]
+  FrameGuard& frame_guard() MAUVE_RT { return frame_guard_; }
+  const FrameGuard& frame_guard() const MAUVE_RT { return frame_guard_; }
 
   /// Notified of writes and calls, for those who carry them outside; `of_stops`: of the writes of a stop, too. [setup]
   virtual void set_notifier(Notifier* notifier, Notifier* of_stops = nullptr) noexcept {
@@ -218,10 +227,10 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   virtual std::uint64_t lost_writes() const MAUVE_RT { return 0; }
   /// What its values take, all those that it has room for; 0: not known. [non-rt]
   virtual std::size_t memory_bytes() const { return 0; }
-  /// Values that a write or a read refused, as a sequence had more elements than the capacity. [rt]
-  virtual std::uint64_t refused_values() const MAUVE_RT { return 0; }
+  /// Values that a write or a read refused: a sequence had more elements than the capacity, or a message was in another frame. [rt]
+  virtual std::uint64_t refused_values() const MAUVE_RT { return frame_guard_.refused(); }
   /// Why the last of them was, in words; empty: none was. [non-rt]
-  virtual std::string why_refused_value() const { return ""; }
+  virtual std::string why_refused_value() const { return frame_guard_.refusal(); }
   /// Writes a serialized message with the time at which it was written; false when malformed or there is no room.
   /// [non-rt]
   virtual bool write_sample(std::span<const std::byte> /*message*/, time_ns_t /*time*/) { return false; }
@@ -267,6 +276,7 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   std::string name_;
   LogSource log_;
   time_ns_t longest_hold_ns_{0};
+  FrameGuard frame_guard_;
   std::vector<ServiceBase*> services_;
   Notifier* notifier_{nullptr};
   Notifier* stop_notifier_{nullptr};

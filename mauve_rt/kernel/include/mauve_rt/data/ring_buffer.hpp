@@ -116,11 +116,12 @@ class RingBuffer final : public LoggedResource<T, Resource> {
   bool write_sample(std::span<const std::byte> message, time_ns_t time_ns) override {
     return write.write_message(message, time_ns);
   }
-  std::string why_refused(std::span<const std::byte> message) const override {
-    const auto value = write.make();
-    return CdrReader(message).get(*value)
-               ? "the ring_buffer was full: " + std::to_string(capacity()) + " elements"
-               : LoggedResource<T, Resource>::why_refused(message);
+
+ protected:
+  std::string why_refused_whole(const T& value, std::span<const std::byte> /*message*/) const override {
+    const std::string of_frame = this->frame_guard().why_refused(frame_ids(value));
+    return of_frame.empty() ? "the ring_buffer was full: " + std::to_string(capacity()) + " elements"
+                            : of_frame;
   }
 
  private:

@@ -64,6 +64,7 @@ struct Wire {
   ServiceBase* service{nullptr};
   int step{0};
   std::shared_ptr<const void> use{};  // Resource::use()
+  const Frames* frames{nullptr};      // that the port declares
 };
 /// Whether both lead to the same service. [non-rt]
 inline bool operator==(const Wire& a, const Wire& b) noexcept { return a.service == b.service; }
@@ -192,6 +193,7 @@ struct ShownPort {
   std::string service;
   time_ns_t longest_hold_ns{0};           // of the resource's lock; 0: not declared
   std::vector<std::byte> stop_message{};  // what a stop writes; empty: nothing
+  Frames frames{};
   bool operator==(const ShownPort&) const = default;
 };
 struct ShownProperty {
@@ -299,6 +301,12 @@ class Component final : public Configurable {
   /// Cores it takes beside the one it was declared with, and whether it may be changed at all. [setup]
   void allow(std::vector<std::string> alternatives, bool reconfigurable);
   const std::vector<std::string>& alternatives() const noexcept { return alternatives_; }
+  /// Frames of ports by name, in addition to those that its shells declare. [setup]
+  void declare_frames(std::map<std::string, Frames> frames) { frames_ = std::move(frames); }
+  const std::map<std::string, Frames>& declared_frames() const noexcept { return frames_; }
+  /// Lets a shell of this component have them; one without such a port is left alone. [setup], before it is connected.
+  /// Throws Error: invalid_argument (a name), frame_mismatch.
+  void give_frames(Shell& shell) const;
   bool is_reconfigurable() const noexcept { return reconfigurable_; }
   /// Throws Error: not_reconfigurable, undeclared_core.
   void check_allowed(const std::string& core_implementation) const;
@@ -472,6 +480,7 @@ class Component final : public Configurable {
   Atomic<bool> has_ready_core_{false};  // whether binding_ is of a configured core
   std::string declared_core_;
   std::vector<std::string> alternatives_;
+  std::map<std::string, Frames> frames_;
   bool reconfigurable_{true};
   CoreBase* spare_{nullptr};                 // the fallback while one is ready or in force
   std::unique_ptr<CoreBase> fallback_core_;  // until it is put in
