@@ -141,7 +141,7 @@ BAD = {
         "length_s: 2",
         "xxxx: 2",
         "xxxx",
-        "unknown key 'xxxx' of resource 'window'; known: child_frame, frame, kind, label, length_s, log_level",
+        "unknown key 'xxxx' of resource 'window'; known: child_frame, frame, kind, label, length_s",
     ),
     "of another kind": (
         "length_s: 2",
