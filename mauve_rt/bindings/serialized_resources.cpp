@@ -64,7 +64,7 @@ class SerializedResource : public Resource {
     if (message.size() < kCdrHeader.size()) return found + ", which are no message";
     if (message.size() > max_bytes_)
       return found + ", more than the " + std::to_string(max_bytes_) + " declared";
-    const std::string of_frame = frame_guard().why_refused(ids_of(message));
+    std::string of_frame = frame_guard().why_refused(ids_of(message));
     if (!of_frame.empty()) return of_frame;
     return "the " + kind() + " was full";
   }

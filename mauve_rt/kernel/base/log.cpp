@@ -156,9 +156,11 @@ LogDrain LogQueue::drain() {
   });
   // By number, too: lines of one instant stay in the order in which their thread wrote them.
   std::vector<std::pair<time_ns_t, std::size_t>> order;
+  order.reserve(lines.size());
   for (std::size_t number = 0; number < lines.size(); ++number)
     order.emplace_back(lines[number].time_ns, number);
   std::ranges::sort(order);
+  drain.lines.reserve(lines.size());
   for (const auto& [time_ns, number] : order) drain.lines.push_back(lines[number]);
   return drain;
 }

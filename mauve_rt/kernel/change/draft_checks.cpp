@@ -218,14 +218,13 @@ void Draft::check_frames() {
     const std::string* component;
     const std::string* port;
     const Wire* wire;
-    int step;  // that connects it, or gives it another shell; 0: it stays
   };
-  std::vector<End> ends;
+  std::multimap<int, End> ends;  // by the step that connects it, or gives it another shell; 0: it stays
   const auto note = [&](const std::string& component, const Wires& wires, const DraftComponent* drafted) {
     for (const auto& [port, wire] : wires) {
       if (wire.service->resource() == nullptr) continue;
       const int step = drafted == nullptr ? 0 : std::max(wire.step, drafted->shell_step);
-      ends.push_back({&component, &port, &wire, step});
+      ends.emplace(step, End{&component, &port, &wire});
     }
   };
   const std::vector<Wiring> all = architecture_.wiring();
@@ -241,10 +240,9 @@ void Draft::check_frames() {
     for (const auto& [port, wire] : component.wires_before) frames_.try_emplace(wire.service->resource());
   }
   frames_.erase(nullptr);
-  std::stable_sort(ends.begin(), ends.end(), [](const End& a, const End& b) { return a.step < b.step; });
   std::map<Resource*, std::vector<const End*>> first;  // that declare a frame that none before has declared
   for (auto& [resource, frames] : frames_) frames = resource->frame_guard().declared();
-  for (const End& end : ends) {
+  for (const auto& [step, end] : ends) {
     if (end.wire->frames == nullptr) continue;
     Resource* const resource = end.wire->service->resource();
     const auto [place, is_new] = frames_.try_emplace(resource, resource->frame_guard().declared());
@@ -270,7 +268,7 @@ void Draft::check_frames() {
                  .expected = difference->ours + ", as the port declares",
                  .found = difference->theirs + " of " + of,
                  .remedy = std::string(kFrameRemedy),
-                 .step = end.step});
+                 .step = step});
   }
 }
 

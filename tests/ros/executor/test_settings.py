@@ -30,6 +30,8 @@ CHANGEABLE = [
     "bag",
     "bag_compression",
     "bag_max_size_bytes",
+    "bag_snapshot_bytes",
+    "bag_snapshot_s",
     "bag_split_bytes",
     "bag_split_s",
     "record_topic_regexes",

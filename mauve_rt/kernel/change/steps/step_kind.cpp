@@ -10,12 +10,12 @@ namespace mauve {
 namespace {
 
 #define MAUVE_LIST_STEP_KIND(name) &steps::name,
-constexpr std::array kKinds{MAUVE_STEP_KINDS(MAUVE_LIST_STEP_KIND)};
+constexpr std::array kStepKinds{MAUVE_STEP_KINDS(MAUVE_LIST_STEP_KIND)};
 #undef MAUVE_LIST_STEP_KIND
 
 const StepKind& kind_of(std::string_view name) {
   std::vector<std::string> names;
-  for (const StepKind* kind : kKinds) {
+  for (const StepKind* kind : kStepKinds) {
     if (kind->name == name) return *kind;
     names.emplace_back(kind->name);
   }
