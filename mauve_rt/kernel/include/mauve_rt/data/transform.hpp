@@ -3,6 +3,7 @@
 #pragma once
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/data/cdr.hpp"
 
 namespace mauve {
 
@@ -24,6 +25,14 @@ struct Transform {
   Vector3 translation{};
   Quaternion rotation{};
 };
+
+}  // namespace mauve
+
+MAUVE_TYPE(mauve::Vector3, "geometry_msgs/msg/Vector3", x, y, z)
+MAUVE_TYPE(mauve::Quaternion, "geometry_msgs/msg/Quaternion", x, y, z, w)
+MAUVE_TYPE(mauve::Transform, "geometry_msgs/msg/Transform", translation, rotation)
+
+namespace mauve {
 
 /// The square of the length. [rt]
 double squared_length(const Quaternion& rotation) MAUVE_RT;

@@ -55,9 +55,6 @@ struct LookupTransform {
 
 }  // namespace mauve
 
-MAUVE_TYPE(mauve::Vector3, "geometry_msgs/msg/Vector3", x, y, z)
-MAUVE_TYPE(mauve::Quaternion, "geometry_msgs/msg/Quaternion", x, y, z, w)
-MAUVE_TYPE(mauve::Transform, "geometry_msgs/msg/Transform", translation, rotation)
 MAUVE_TYPE(mauve::SetTransform::Request, "mauve_msgs/srv/SetTransform_Request", parent, child, transform,
            time_ns, is_static)
 MAUVE_TYPE(mauve::SetTransform::Response, "mauve_msgs/srv/SetTransform_Response", outcome)

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "mauve_rt/data/cdr.hpp"
+#include "mauve_rt/data/transform.hpp"
 
 /// A type's identity is its name and its layout: ports of these structs connect to any other ones of the same message that have
 /// the same fields in the same places. Units as in ROS: m, rad, m/s, rad/s.
@@ -28,18 +29,8 @@ struct Point {
   double z{0.0};
 };
 
-struct Vector3 {
-  double x{0.0};
-  double y{0.0};
-  double z{0.0};
-};
-
-struct Quaternion {
-  double x{0.0};
-  double y{0.0};
-  double z{0.0};
-  double w{1.0};
-};
+using mauve::Quaternion;
+using mauve::Vector3;
 
 struct Pose {
   Point position;
@@ -63,8 +54,6 @@ MAUVE_TYPE(mauve::types::Bool, "std_msgs/msg/Bool", data)
 MAUVE_TYPE(mauve::types::Int64, "std_msgs/msg/Int64", data)
 MAUVE_TYPE(mauve::types::Float64, "std_msgs/msg/Float64", data)
 MAUVE_TYPE(mauve::types::Point, "geometry_msgs/msg/Point", x, y, z)
-MAUVE_TYPE(mauve::types::Vector3, "geometry_msgs/msg/Vector3", x, y, z)
-MAUVE_TYPE(mauve::types::Quaternion, "geometry_msgs/msg/Quaternion", x, y, z, w)
 MAUVE_TYPE(mauve::types::Pose, "geometry_msgs/msg/Pose", position, orientation)
 MAUVE_TYPE(mauve::types::Pose2D, "geometry_msgs/msg/Pose2D", x, y, theta)
 MAUVE_TYPE(mauve::types::Twist, "geometry_msgs/msg/Twist", linear, angular)
