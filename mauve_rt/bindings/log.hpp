@@ -11,7 +11,7 @@ class PyLog {
  public:
   explicit PyLog(std::shared_ptr<ShellLink> link) : link_(std::move(link)) {}
 
-  /// `words`: the format, then the arguments. Under the interpreter's lock.
+  /// Under the interpreter's lock.
   void write(LogLevel level, const py::str& format, const py::args& arguments) const;
   bool is_on(LogLevel level) const { return Log(link_->log()).is_on(level); }
 

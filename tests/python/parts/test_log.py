@@ -128,6 +128,23 @@ def test_a_wrong_number_of_arguments_is_seen_in_the_line(built: Stage):
     ]
 
 
+def test_the_text_of_an_argument_may_write_a_line_itself(built: Stage, run: Any):
+    class Careful(LogCore):
+        def act(self) -> None:
+            self.runs += 1
+            if self.runs == 1:
+                self.log().warn("{} at {}", self, 7)
+
+        def __str__(self) -> str:
+            self.log().info("asked for its text")
+            return "the core"
+
+    built.architecture.add_component("c", LogShell, Careful, ActFsm)
+    built.share("lamp", Lamp(), "c.switch.switch")
+    run()
+    assert told(built)[2:] == ["info c//Act: asked for its text", "warn c//Act: the core at 7"]
+
+
 def test_a_part_of_no_architecture_writes_nowhere():
     shell = LogShell()
     shell.log().error("into the void")
