@@ -7,14 +7,14 @@ from mauve_rt.cli.arguments import add_executor
 from mauve_rt.cli.completion import complete_components, completed_by
 from mauve_rt.cli.verb import OK, REFUSED
 
-_LEVELS = ("debug", "info", "warn", "error", "fatal")
+CHOICES = ("debug", "info", "warn", "error", "fatal")  # a command starts without the kernel, which has them
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Of `mauve log-level`."""
     add_executor(parser)
     completed_by(parser.add_argument("part", help="name of the component or resource"), complete_components)
-    parser.add_argument("level", nargs="?", choices=_LEVELS, help="the new level; without it the present one")
+    parser.add_argument("level", nargs="?", choices=CHOICES, help="the new level; without it the present one")
 
 
 def main(args: argparse.Namespace) -> int:
@@ -23,7 +23,7 @@ def main(args: argparse.Namespace) -> int:
     from rcl_interfaces.srv import GetLoggerLevels, SetLoggerLevels  # noqa: PLC0415
 
     from mauve_rt.cli.client import connected  # noqa: PLC0415
-    from mauve_rt.interfaces.log_messages import SEVERITIES, logger_name  # noqa: PLC0415
+    from mauve_rt.interfaces.log_messages import LEVELS, SEVERITIES, logger_name  # noqa: PLC0415
 
     logger = logger_name(args.executor, args.part)
     with connected(first=True) as client:
@@ -37,6 +37,5 @@ def main(args: argparse.Namespace) -> int:
         reply = client.call(
             GetLoggerLevels, f"{args.executor}/get_logger_levels", GetLoggerLevels.Request(names=[logger])
         )
-    by_severity = {severity: level for level, severity in SEVERITIES.items()}
-    print(f"{args.part}: {by_severity.get(reply.levels[0].level, 'not set')}")
+    print(f"{args.part}: {LEVELS.get(reply.levels[0].level, 'not set')}")
     return OK

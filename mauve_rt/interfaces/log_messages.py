@@ -8,11 +8,12 @@ from rcl_interfaces.msg import Log
 from mauve_rt._kernel import TASK_SETTINGS
 from mauve_rt.control.part_log import LogLine
 
-__all__ = ["LOG_TYPE", "ROSOUT", "SEVERITIES", "log_message", "logger_name"]
+__all__ = ["LEVELS", "LOG_TYPE", "ROSOUT", "SEVERITIES", "log_message", "logger_name"]
 
 ROSOUT, LOG_TYPE = "/rosout", "rcl_interfaces/msg/Log"
 SEVERITIES = {level: 10 * (number + 1) for number, level in enumerate(TASK_SETTINGS["log_level"].choices)}
 """Of ROS, by level; the numbers of rcl_interfaces/msg/Log and of the services of loggers."""
+LEVELS = {severity: level for level, severity in SEVERITIES.items()}
 
 
 def logger_name(node: str, part: str) -> str:

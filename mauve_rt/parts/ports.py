@@ -232,8 +232,17 @@ class RequestPort(Member):
         """
         if not isinstance(request, self.service.Request):
             raise TypeError(f"port '{self.name}': expected {self.type}.Request, found {request!r}")
-        data = self._shell.request(self.name, messages.serialize(request))
-        return messages.deserialize(data, self.service.Response)
+        return self.call_through(self._shell, request)
+
+    def call_through(self, view: ShellView, request: Any) -> Any:
+        """Call the service by the port of this name in a component's shell; the response.
+
+        Raises:
+            MauveError: not connected, or not answered.
+        """
+        return messages.deserialize(
+            view.request(self.name, messages.serialize(request)), self.service.Response
+        )
 
 
 class EventPort(Member):

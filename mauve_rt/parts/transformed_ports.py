@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 from mauve_rt._kernel import TRANSFORM_OUTCOMES, RigidTransform
-from mauve_rt.parts import messages
 from mauve_rt.parts.ports import ReadPort, RequestPort, Sample
 
 __all__ = ["TransformedReadPort", "TransformedSample"]
@@ -57,8 +56,7 @@ class TransformedReadPort(ReadPort[T]):
             return TransformedSample(sample.value, sample.status, sample.time_ns)
         time_ns = 0 if self._latest else sample.time_ns
         request = self._lookup.service.Request(target=self._to, source=source, time_ns=time_ns)
-        data = self._shell.request(self._lookup.name, messages.serialize(request))
-        found = messages.deserialize(data, self._lookup.service.Response)
+        found = self._lookup.call_through(self._shell, request)
         outcome = TRANSFORM_OUTCOMES[found.outcome]
         if outcome != _DONE:
             none = self.message_class()

@@ -106,7 +106,7 @@ std::string LogLine::text() const {
       text += all[at];
       continue;
     }
-    // Formats of Python are checked by nobody: a place without an argument stays as it is.
+    // Formats of Python are not checked before: a place without an argument stays as it is.
     text += rest.next(all.substr(at + 1, end - at - 2)).value_or(std::string(all.substr(at, end - at)));
     at = end - 1;
   }

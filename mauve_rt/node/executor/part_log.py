@@ -17,13 +17,12 @@ from mauve_rt._kernel import monotonic_ns
 from mauve_rt.control.part_log import LogBundles, LogLine
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import MauveError
-from mauve_rt.interfaces.log_messages import LOG_TYPE, ROSOUT, SEVERITIES, log_message, logger_name
+from mauve_rt.interfaces.log_messages import LEVELS, LOG_TYPE, ROSOUT, SEVERITIES, log_message, logger_name
 from mauve_rt.node.executor.recording import Recording
 from mauve_rt.node.shared.watch import Watch
 
 _PERIOD_S = 0.05  # a ring holds the lines of 0.1 s of a component that writes one in each ms
 _END_S = 2.0
-_LEVELS = {severity: level for level, severity in SEVERITIES.items()}
 
 
 class PartLog:
@@ -127,13 +126,13 @@ class PartLog:
 
     def _set_level(self, logger: str, severity: int) -> SetLoggerLevelsResult:
         try:
-            if severity not in _LEVELS:
-                expected = ", ".join(f"{number} ({level})" for number, level in _LEVELS.items())
+            if severity not in LEVELS:
+                expected = ", ".join(f"{number} ({level})" for number, level in LEVELS.items())
                 return SetLoggerLevelsResult(
                     reason=f"level of {logger}: expected {expected}, found {severity}"
                 )
             if part := self._part_of(logger):
-                self._runtime.architecture.set_log_level(part, _LEVELS[severity])
+                self._runtime.architecture.set_log_level(part, LEVELS[severity])
             else:
                 rclpy.logging.set_logger_level(logger, severity, detailed_error=True)
         except (MauveError, RuntimeError, ValueError) as error:

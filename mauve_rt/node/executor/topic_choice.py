@@ -146,7 +146,7 @@ class TopicChoice:
         return (topic for name, topic in found.items() if name not in anyhow)
 
     def _parse(self, topic: str, anyhow: Mapping[str, str]) -> ChosenTopic:
-        name, type_name, qos, *more = [*topic.split(":"), *([""] * (2 - topic.count(":")))]
+        name, type_name, qos, *more = _fields(topic)
         try:
             full_name = self._node.resolve_topic_name(name)
         except Exception as error:  # rclpy has an exception class of its own for each mistake
@@ -172,12 +172,17 @@ class TopicChoice:
         return ChosenTopic(name, full_name, type_name, qos or _BEST_EFFORT)
 
 
+def _fields(text: str) -> list[str]:
+    """Name, type and quality of service of an entry, empty where it has none; what is more comes behind."""
+    return [*text.split(":"), *([""] * (2 - text.count(":")))]
+
+
 def _is_pattern(text: str) -> bool:
     return not _WILDCARDS.isdisjoint(text)
 
 
 def _glob(text: str) -> TopicPattern:
-    name, type_name, qos, *more = [*text.split(":"), *([""] * (2 - text.count(":")))]
+    name, type_name, qos, *more = _fields(text)
     is_type_known = not type_name or message_class(type_name) is not None
     if not name.startswith("/") or not is_type_known or more or (qos or _BEST_EFFORT) not in QOS_NAMES:
         forms = "/NAME, /NAME:package/msg/Type of an installed message, and perhaps one of"

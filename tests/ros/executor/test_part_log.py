@@ -17,6 +17,8 @@ from rclpy.serialization import deserialize_message
 
 from mauve_msgs.srv import ReplaceCore
 from mauve_rt._kernel import Simulation
+from mauve_rt.cli.log_level_verb import CHOICES
+from mauve_rt.interfaces.log_messages import SEVERITIES
 from mauve_rt.simulation.executor import SimulatedExecutor
 from mauve_rt.simulation.topics import SimulatedTopics
 
@@ -112,6 +114,10 @@ def test_levels_are_set_by_mauve_and_by_the_services_of_ros(executor: Any, graph
         zip(names, (40, 10, 10), strict=True)
     )
     assert executor.process.poll() is None
+
+
+def test_the_command_takes_the_levels_that_there_are() -> None:
+    assert tuple(SEVERITIES) == CHOICES
 
 
 def test_what_a_refused_core_says_in_its_hook_is_told(executor: Any, graph: Any) -> None:

@@ -309,7 +309,7 @@ class LogSource {
 /// for a lock.
 class Log {
  public:
-  /// nullptr: a part that belongs to no architecture, whose lines nobody gets.
+  /// nullptr: a part that belongs to no architecture; its lines go nowhere.
   explicit Log(const LogSource* source) MAUVE_RT : source_(source) {}
 
   template <typename... Args>

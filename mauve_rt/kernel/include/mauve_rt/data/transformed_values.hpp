@@ -39,7 +39,7 @@ concept HasXyz = requires(T value) {
 };
 template <typename T>
 concept HasXyzw = HasXyz<T> && requires(T value) { value.w; };
-/// geometry_msgs has the same fields in points and vectors: a vector is told by the name of its type.
+/// geometry_msgs has the same fields in points and vectors: the name of its type marks a vector.
 template <typename T>
 concept IsVector = HasXyz<T> && !HasXyzw<T> && requires { TypeTraits<T>::name; } &&
                    std::string_view(TypeTraits<T>::name).ends_with("Vector3");

@@ -363,7 +363,7 @@ class Task final : public Waiter {
   const ThreadCounters& counters() const MAUVE_RT { return counters_; }
   /// The trace's ring, for who runs the machine; nullptr when nothing is traced. [rt]
   TraceRing* ring() MAUVE_RT { return ring_.get(); }
-  /// The ring of its log lines; nullptr: nobody takes them. [rt]
+  /// The ring of its log lines; nullptr: the task belongs to no architecture. [rt]
   LogRing* log_ring() MAUVE_RT { return log_ring_.get(); }
   /// Where its log lines go. Once, before it has a thread. [setup]
   void set_log_queue(std::shared_ptr<LogQueue> queue) noexcept {
