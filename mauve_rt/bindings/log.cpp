@@ -100,7 +100,8 @@ void PyLog::write(LogLevel level, const py::str& format, const py::args& argumen
   const std::size_t count = kept == nullptr ? 1 : std::min(arguments.size(), LogLine::kMostArguments);
   const std::size_t texts = kept == nullptr ? 1 : texts_in(arguments, count);
   const std::size_t places = texts == 0 ? 0 : (LogLine::kMostArguments - (count - texts)) / texts;
-  LogLine said;  // not in the ring's place: the text of an argument may be code of the user, which may log, or raise
+  LogLine
+      said;  // not in the ring's place: the text of an argument may be code of the user, which may log, or raise
   said.format = kept == nullptr ? "{}" : kept;
   if (kept == nullptr) {
     said.add_text(0, std::string(format), places);
