@@ -40,10 +40,13 @@ struct DraftComponent {
   int fsm_step{0};
   int core_step{0};
   std::optional<ProbationOptions> probation{};  // of the new core
+  std::optional<BumplessOptions> bumpless{};    // the new core goes in where its outputs are near
   std::shared_ptr<Shadow> promoted{};           // the new core is its candidate
+  bool is_fresh{false};                         // which gets no copies of the old core's state
   bool is_candidate_out{false};                 // the preparation has taken it out of the shadow
   std::shared_ptr<Shadow> shadow{};             // begins
   int shadow_step{0};
+  std::shared_ptr<Shadow> candidate{};  // of a bumpless change that found no shadow
   bool core_unready{false};  // the new core is put in as it is
   int configure_step{0};     // the last that configures it anew
   bool is_made_anew{false};  // by new instances of its parts
@@ -66,6 +69,8 @@ struct DraftComponent {
     if (configure_step != 0) parts = parts | ReadBy::core | ReadBy::fsm | ReadBy::shell;
     return parts;
   }
+  /// Whether a new core is to wait for an instant at which its outputs are near.
+  bool awaits_near() const noexcept { return bumpless && ran && runs && !restarts; }
   /// Whether it was FAULTED, and is STOPPED or RUNNING afterwards.
   bool is_repaired() const noexcept { return state == ComponentState::faulted && replaced() != ReadBy::none; }
   bool sets_structural() const noexcept {
@@ -169,6 +174,7 @@ class Draft {
   static void check_structural(const DraftComponent& component);
   static void check_repaired(const DraftComponent& component);
   void check_probation(const DraftComponent& component) const;
+  void check_bumpless(const DraftComponent& component) const;
   static void check_shadow(const DraftComponent& component);
   static void check_core(const DraftComponent& component);
   void check_required_ports(const DraftComponent& component) const;

@@ -23,6 +23,7 @@ void Draft::finish() {
     if (component.shell_step != 0) check_kept_wires(component);
     if (!component.is_added) check_structural(component);
     if (component.probation) check_probation(component);
+    if (component.bumpless) check_bumpless(component);
     if (component.shadow != nullptr) check_shadow(component);
     if (architecture_.is_configured()) check_required_ports(component);
     if (component.core_unready && component.runs) {
@@ -114,6 +115,37 @@ void Draft::check_probation(const DraftComponent& component) const {
            "no structural property that a part on probation reads",
            "set it in a transaction without probation");
   }
+}
+
+/// The candidate is compared in the parts and with the inputs that the component has now.
+void Draft::check_bumpless(const DraftComponent& component) const {
+  const auto refuse = [&](ErrorCode code, const char* what, const char* expected, const char* remedy) {
+    throw Error(code, what,
+                {.component = component.name(),
+                 .element = "bumpless",
+                 .expected = expected,
+                 .remedy = remedy,
+                 .step = component.core_step});
+  };
+  try {
+    check_options(*component.bumpless, component.name());
+  } catch (const Error& failure) {
+    rethrow_as_of(failure, component.name(), component.core_step);
+  }
+  if (!deployed_ || component.is_added)
+    refuse(ErrorCode::not_configured, "only a component of a deployed architecture is changed without a bump",
+           "a component of a deployed architecture", "deploy it first, or leave `bumpless` out");
+  const bool is_changed = component.shell_step != 0 || component.fsm_step != 0 || component.configure_step != 0 ||
+                          !component.properties.empty() || component.wires != component.wires_before;
+  if (is_changed)
+    refuse(ErrorCode::invalid_argument, "a bumpless change replaces the core of its component, and nothing else",
+           "no new shell or fsm, no wiring, property or configure step of the component",
+           "make these changes in a transaction before");
+  const auto others = std::count_if(components_.begin(), components_.end(),
+                                    [](const DraftComponent& each) { return each.bumpless.has_value(); });
+  if (others > 1)
+    refuse(ErrorCode::invalid_argument, "one transaction makes one bumpless change",
+           "bumpless for one component", "make a transaction for each component");
 }
 
 /// The candidate has the parts and the inputs that the component has now.

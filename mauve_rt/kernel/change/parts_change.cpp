@@ -68,6 +68,22 @@ PartsChange::PartsChange(Component& component, Parts fresh)
   }
 }
 
+PartsChange::PartsChange(Component& component, std::shared_ptr<Shadow> candidate)
+    : component_(component),
+      new_shell_(nullptr),
+      fsm_before_(&component.fsm()),
+      restarts_(false),
+      candidate_(std::move(candidate)),
+      afresh_(true),
+      promotes_(true),
+      trace_id_(TraceNames::intern("replace_core " + candidate_->core_name())) {
+  task = &component.task();
+  candidate_->with_core(Shadow::kStateEnd, [this](CoreBase& core) {
+    shown_core_ = component_.keep_shown(core);
+    budget_ns_ = core.budget_ns();
+  });
+}
+
 PartsChange::~PartsChange() { retire(); }
 
 Shell& PartsChange::shell() noexcept { return new_shell_ != nullptr ? *new_shell_ : component_.shell(); }
@@ -110,7 +126,9 @@ void PartsChange::prepare_parts() {
   if (restarts_) component_.check_fallback(shell, fsm);
   period_ns_ = component_.settled_period_ns(fsm);  // not the task's: a fallback is prepared before it has one
   if (has_probation() && replaces_fsm()) prepare_way_back();
-  if (parts_.core != nullptr) {
+  if (candidate_ != nullptr) {
+    prepare_candidate();
+  } else if (parts_.core != nullptr) {
     what_ = parts_.core->description();
     component_.bind_and_configure(*parts_.core, shell, fsm, binding_);
     if (!afresh_) handover_ = std::make_unique<Handover>(component_.core(), *parts_.core);
@@ -135,16 +153,39 @@ void PartsChange::prepare_parts() {
   kept_waits_ = kept_waits(*fsm_before_, *parts_.fsm, period_ns_);
 }
 
+/// It executes in the shadow still: it is bound to the component's shell when it goes in.
+void PartsChange::prepare_candidate() {
+  what_ = "core " + candidate_->core_name();
+  candidate_->with_core(Shadow::kStateEnd, [this](CoreBase& core) {
+    binding_ = component_.require_binding(core, component_.fsm());
+  });
+}
+
 void PartsChange::prepare_way_back() {
   const time_ns_t period_before_ns = component_.settled_period_ns(*fsm_before_);
   require_places_kept(*fsm_before_, period_before_ns, *parts_.fsm, period_ns_);
   waits_back_ = kept_waits(*parts_.fsm, *fsm_before_, period_before_ns);
 }
 
+bool PartsChange::is_ready(bool is_last) noexcept {
+  if (candidate_ == nullptr || parts_.core != nullptr || candidate_->has_ended()) return true;
+  if (!candidate_->has_begun()) {
+    component_.task_.set_shadow(*candidate_);
+    return false;
+  }
+  if (is_last && candidate_->is_near()) parts_.core = candidate_->hand_over();
+  return parts_.core != nullptr;
+}
+
 bool PartsChange::adopt() {
   if (component_.parts_.fsm.get() != fsm_before_)
     return false;  // that of one on probation, which has gone out
+  if (candidate_ != nullptr) {
+    if (parts_.core == nullptr || !parts_.core->bind_shell(component_.shell())) return false;
+    parts_.core->set_context(&component_.task_.context());
+  }
   if (afresh_ || unready_) return true;
+  if (promotes_) return handover_->is_from(*component_.parts_.core);
   // Else a fallback took the place of the core meanwhile.
   if (parts_.core != nullptr) return handover_->is_from(*component_.parts_.core) && handover_->adopt();
   return kept_core_ == component_.parts_.core.get();
@@ -187,7 +228,7 @@ void PartsChange::take() noexcept {
   component_.task_.end_probation(is_fallback_);
   component_.task_.end_shadow(promotes_ ? ShadowCause::promotion : ShadowCause::changed);
   if (parts_.core != nullptr) {
-    if (!afresh_ && !unready_) handover_->take();
+    if (!afresh_ && !unready_) promotes_ ? handover_->copy() : handover_->take();
     exchange_core();
   } else if (parts_.shell != nullptr) {
     component_.parts_.core->bind_shell(*parts_.shell);
@@ -231,6 +272,7 @@ void PartsChange::take_over_events(const FsmBase& before, bool keeps_place) noex
 }
 
 time_ns_t PartsChange::declared_ns() const noexcept {
+  if (candidate_ != nullptr) return budget_ns_;
   return parts_.core != nullptr ? parts_.core->budget_ns() : 0;
 }
 

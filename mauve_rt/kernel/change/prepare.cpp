@@ -7,6 +7,7 @@
 #include "mauve_rt/base/contract.hpp"
 
 #include "base/prefault.hpp"
+#include "change/steps/step_kind.hpp"
 #include "change/work.hpp"
 #include "run/preview.hpp"
 
@@ -262,12 +263,15 @@ void TransactionCommit::Work::prepare_change(DraftComponent& changed) {
 void TransactionCommit::Work::prepare_parts(Change& change) {
   DraftComponent& draft = *change.draft;
   Component& component = *draft.component;
-  constexpr time_ns_t kStateEnd = s_to_ns(1);
-  if (draft.promoted != nullptr) {
-    draft.fresh.core = draft.promoted->suspend(kStateEnd);
-    draft.is_candidate_out = true;
+  if (draft.awaits_near()) {
+    change.parts = std::make_unique<PartsChange>(component, prepare_candidate(draft));
+  } else {
+    if (draft.promoted != nullptr) {
+      draft.fresh.core = draft.promoted->suspend(Shadow::kStateEnd);
+      draft.is_candidate_out = true;
+    }
+    change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh));
   }
-  change.parts = std::make_unique<PartsChange>(component, std::move(draft.fresh));
   if (draft.core_unready) change.parts->leave_unready();
   if (draft.shell_step != 0) {
     set_all(change.parts->shell(), draft.properties);
@@ -278,24 +282,57 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
       keep(component, std::make_unique<WiringChange>(component.require_port(name), PortConnection{}));
   }
   if (draft.is_repaired() || draft.is_made_anew) change.parts->start_afresh();
-  if (draft.promoted != nullptr) change.parts->promote();
+  if (draft.promoted != nullptr && !draft.awaits_near()) change.parts->promote(draft.is_fresh);
   if (draft.probation) {
-    change.parts->set_probation(std::make_shared<Probation>(component, change.parts->core()->implementation(),
-                                                            std::move(*draft.probation)));
+    const auto& candidate = change.parts->candidate();
+    const std::string core =
+        candidate != nullptr ? candidate->core_name() : change.parts->core()->implementation();
+    change.parts->set_probation(std::make_shared<Probation>(component, core, std::move(*draft.probation)));
   }
   Preview preview;
   begin_preview(preview, change.parts->shell(), draft);
   change.parts->prepare();
-  if (const Handover* handover = change.parts->handover()) {
-    StepReport& report = reports_[static_cast<std::size_t>(draft.core_step - 1)];
-    report.taken = handover->taken();
-    report.left = handover->left();
+  note_fields(draft.core_step, change.parts->handover());
+  if (draft.candidate != nullptr) note_fields(draft.core_step, draft.candidate->handover());
+}
+
+void TransactionCommit::Work::note_fields(int step, const Handover* handover) {
+  if (handover == nullptr) return;
+  StepReport& report = reports_[static_cast<std::size_t>(step - 1)];
+  report.taken = handover->taken();
+  report.left = handover->left();
+}
+
+/// Of a bumpless change: it executes in the shadow from the first wait of the component on, unless it does already.
+std::shared_ptr<Shadow> TransactionCommit::Work::prepare_candidate(DraftComponent& changed) {
+  Component& component = *changed.component;
+  const BumplessOptions& options = *changed.bumpless;
+  std::shared_ptr<Shadow> candidate = changed.promoted;
+  if (candidate == nullptr) {
+    require_no_shadow(*draft_, changed);
+    component.settle_shadow();
+    const time_ns_t period_ns = component.settled_period_ns(component.fsm());
+    const time_ns_t budget_ns = options.budget_ns != 0 ? options.budget_ns : std::max<time_ns_t>(period_ns, 1);
+    candidate = std::make_shared<Shadow>(component,
+                                         ShadowParts{.shell = make_shadow_shell(component),
+                                                     .core = std::move(changed.fresh.core),
+                                                     .fsm = make_shadow_fsm(component)},
+                                         ShadowOptions{.budget_ns = budget_ns});
+    changed.candidate = candidate;
+    candidate->prepare(component.core());
   }
+  candidate->await_near(options.outputs, component, Shadow::kStateEnd);
+  if (options_.dry_run || changed.promoted != nullptr) return candidate;
+  prefault_allocated();
+  host_->run_shadow(candidate);
+  component.keep_shadow(candidate);
+  return candidate;
 }
 
 void TransactionCommit::Work::prepare_shadow(const DraftComponent& changed) {
   Component& component = *changed.component;
-  changed.shadow->prepare();
+  changed.shadow->prepare(component.core());
+  note_fields(changed.shadow_step, changed.shadow->handover());
   if (options_.dry_run) return;
   if (component.task().has_thread()) prefault_allocated();
   host_->run_shadow(changed.shadow);
@@ -310,6 +347,7 @@ void TransactionCommit::Work::give_back_candidates() noexcept {
       shadow->conclude(ShadowCause::closed, changed.component->task().clock().now_ns());
       changed.component->retire_shadow(shadow);
     }
+    if (changed.awaits_near()) give_back_candidate(changed);
     if (!changed.is_candidate_out) continue;
     std::unique_ptr<CoreBase> core = std::move(changed.fresh.core);
     for (Change& change : changes_) {
@@ -318,6 +356,25 @@ void TransactionCommit::Work::give_back_candidates() noexcept {
     }
     changed.promoted->resume(std::move(core));
   }
+}
+
+/// Of a bumpless change that is not made: a candidate that was there before goes on.
+void TransactionCommit::Work::give_back_candidate(const DraftComponent& changed) noexcept {
+  const std::shared_ptr<Shadow>& candidate = changed.promoted != nullptr ? changed.promoted : changed.candidate;
+  if (candidate == nullptr) return;
+  candidate->end_await();
+  std::unique_ptr<CoreBase> core;
+  for (Change& change : changes_) {
+    if (change.draft == &changed && change.parts != nullptr && !change.parts->was_taken())
+      core = change.parts->give_back_core();
+  }
+  if (core != nullptr) candidate->resume(std::move(core));
+  if (candidate == changed.promoted) return;
+  Component& component = *changed.component;
+  candidate->conclude(ShadowCause::lost, component.task().clock().now_ns());
+  component.task().forget_shadow(*candidate);
+  candidate->detach();
+  component.retire_shadow(candidate);
 }
 
 void TransactionCommit::Work::prepare_wiring(Change& change) {

@@ -14,12 +14,20 @@ Transaction& Transaction::replace_core(const std::string& component, std::unique
 }
 Transaction& Transaction::replace_core(const std::string& component, const std::string& implementation,
                                        ProbationOptions options) {
-  return add(steps::replace_core, component, implementation, CoreOnProbation{.options = std::move(options)});
+  return replace_core(component, implementation, ReplaceOptions{.probation = std::move(options)});
 }
 Transaction& Transaction::replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
                                        ProbationOptions options) {
+  return replace_core(component, std::move(core), ReplaceOptions{.probation = std::move(options)});
+}
+Transaction& Transaction::replace_core(const std::string& component, const std::string& implementation,
+                                       ReplaceOptions options) {
+  return add(steps::replace_core, component, implementation, CoreWithOptions{.options = std::move(options)});
+}
+Transaction& Transaction::replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
+                                       ReplaceOptions options) {
   return add(steps::replace_core, component, {},
-             CoreOnProbation{.core = std::move(core), .options = std::move(options)});
+             CoreWithOptions{.core = std::move(core), .options = std::move(options)});
 }
 Transaction& Transaction::shadow(const std::string& component, const std::string& implementation,
                                  ShadowOptions options) {
@@ -33,7 +41,9 @@ Transaction& Transaction::shadow(const std::string& component, std::unique_ptr<C
 Transaction& Transaction::end_shadow(const std::string& component) {
   return add(steps::end_shadow, component);
 }
-Transaction& Transaction::promote(const std::string& component) { return add(steps::promote, component); }
+Transaction& Transaction::promote(const std::string& component, PromoteOptions options) {
+  return add(steps::promote, component, {}, std::move(options));
+}
 Transaction& Transaction::place_core(const std::string& component, std::unique_ptr<CoreBase> core) {
   return add(steps::place_core, component, {}, std::move(core));
 }

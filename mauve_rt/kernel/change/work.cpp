@@ -3,9 +3,13 @@
 #include "change/work.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/seam/sleep.hpp"
+
+#include "base/number_text.hpp"
 
 namespace mauve {
 
@@ -118,6 +122,7 @@ void TransactionCommit::Work::require_preparable() const {
     if (component.configure_step != 0) refuse(component.configure_step, "to configure cannot be prepared");
     if (component.promoted != nullptr)
       refuse(component.core_step, "a promote cannot be prepared: the candidate would stand still");
+    if (component.bumpless) refuse(component.core_step, "a bumpless change cannot be prepared");
   }
 }
 
@@ -232,6 +237,15 @@ void TransactionCommit::Work::draft_steps() {
   } catch (const Error& failure) {
     rethrow_at(failure.detail().step, failure);
   }
+  for (const DraftComponent& component : draft_->components()) {
+    if (!options_.idle || !component.bumpless) continue;
+    throw Error(ErrorCode::invalid_argument, "a bumpless change waits for near outputs, not for an idle instant",
+                {.component = component.name(),
+                 .element = "idle",
+                 .remedy = "leave out `idle` or `bumpless`",
+                 .step = component.core_step,
+                 .step_name = text_of(component.core_step)});
+  }
 }
 
 Afterwards TransactionCommit::Work::afterwards_of(const Change& change) const {
@@ -263,6 +277,10 @@ void TransactionCommit::Work::gather() {
     place->afterwards = afterwards_of(change);
     place->replaces_parts = change.parts != nullptr;
     if (change.parts != nullptr && change.draft->restarts) change.parts->give_up_place();
+    if (change.parts != nullptr && change.parts->candidate() != nullptr) {
+      commit->set_last(*place, change.draft->bumpless->within_ns, *host_);
+      swapped_ = {.candidate = change.parts->candidate(), .step = change.draft->core_step};
+    }
     place->repairs = change.draft->is_repaired();
     place->only_epoch = change.draft->only_epoch;
     if (draft_->resynchronise_step() != 0) place->epoch_lead_ns = kDeploymentLead;
@@ -405,6 +423,9 @@ void TransactionCommit::Work::carry_out_commit() {
 
 void TransactionCommit::Work::throw_not_made() {
   const bool is_adopts_own = commit_->refused_by() != nullptr && !commit_->has_given_up();
+  for (const Change& change : changes_) {
+    if (change.parts != nullptr && change.parts->candidate() != nullptr) throw_if_not_near(change);
+  }
   try {
     commit_->rethrow_refusal();
   } catch (const Error& failure) {
@@ -415,6 +436,42 @@ void TransactionCommit::Work::throw_not_made() {
     throw_refused(caught_text());
   }
   throw_refused("the adopt of the new core returned false");
+}
+
+/// Of a bumpless change that was not made for that.
+void TransactionCommit::Work::throw_if_not_near(const Change& change) const {
+  const bool is_over = commit_->off() == Commit::Off::not_ready;
+  const ShadowRecord record = change.parts->candidate()->record();
+  const bool has_ended = commit_->refused_by() == change.parts.get() && record.end_ns != 0;
+  if (!is_over && !has_ended) return;
+  const auto& bumpless = *change.draft->bumpless;
+  ErrorDetail detail{.component = change.draft->name(),
+                     .element = "bumpless",
+                     .expected = {},
+                     .found = has_ended ? record.reason : std::string{},
+                     .remedy = has_ended ? "correct the candidate; nothing was changed"
+                                         : "allow a greater step or more time (within_s), or hand over more state",
+                     .step = change.draft->core_step,
+                     .step_name = text_of(change.draft->core_step)};
+  for (const OutputStep& output : record.steps) {
+    const std::string separator = detail.expected.empty() ? "" : ", ";
+    detail.expected += separator + output.output + " within " + number_text(output.greatest);
+    if (has_ended) continue;
+    detail.found += (detail.found.empty() ? "" : ", ") +
+                    (std::isnan(output.least)
+                         ? output.output + " not written by both cores"
+                         : output.output + " at least " + number_text(output.least) + " apart, at instant " +
+                               std::to_string(output.least_instant_ns) + " ns");
+  }
+  if (has_ended)
+    throw Error(ErrorCode::adopt_refused, "the candidate ended before its outputs were near those of the core",
+                detail);
+  detail.found += "; " + std::to_string(record.compared) + " of " + std::to_string(record.releases) +
+                  " releases compared";
+  throw Error(ErrorCode::timeout,
+              "the outputs of the candidate did not come near those of the core within " +
+                  std::to_string(bumpless.within_ns / ms_to_ns(1)) + " ms; nothing was changed",
+              detail);
 }
 
 void TransactionCommit::Work::throw_refused(const std::string& what) const {
@@ -499,6 +556,11 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
   for (const auto& [name, place] : places_) {
     if (committed_) measured[name] = report_of(*place, std::max<time_ns_t>(0, until - monotonic_now_ns()));
   }
+  if (swapped_.candidate != nullptr) {
+    const std::vector<OutputStep> outputs = measured_steps(until);
+    const LockGuard lock(reports_mutex_);
+    reports_[static_cast<std::size_t>(swapped_.step - 1)].outputs = outputs;
+  }
   const LockGuard lock(reports_mutex_);
   TransactionReport report{.steps = reports_,
                            .revision = architecture_.revision(),
@@ -538,6 +600,13 @@ TransactionReport TransactionCommit::Work::report(time_ns_t phase_timeout_ns) {
     report.blackout_ns = std::max(report.blackout_ns, step.blackout_ns);
   }
   return report;
+}
+
+/// Of a bumpless change that is made: once the new core has written each listed output, or as far as it has by the instant.
+std::vector<OutputStep> TransactionCommit::Work::measured_steps(time_ns_t until_ns) const {
+  constexpr time_ns_t kMeasuredLook = us_to_ns(500);
+  while (swapped_.candidate->awaits_outputs() && monotonic_now_ns() < until_ns) sleep_for(kMeasuredLook);
+  return swapped_.candidate->record().steps;
 }
 
 const std::string& TransactionCommit::Work::text_of(int step) const {

@@ -133,6 +133,8 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void prepare_removed(DraftComponent& removed);
   void prepare_parts(Change& change);
   void prepare_shadow(const DraftComponent& changed);
+  std::shared_ptr<Shadow> prepare_candidate(DraftComponent& changed);
+  void note_fields(int step, const Handover* handover);
   bool make_anew(DraftComponent& changed);
   void configure_anew(DraftComponent& changed);
   void prepare_repair(const DraftComponent& changed);
@@ -150,6 +152,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void carry_out_commit();
   void require_host_open() const;
   [[noreturn]] void throw_refused(const std::string& what) const;
+  void throw_if_not_near(const Change& change) const;
   // after it
   void settle_with_host();
   void note_made() noexcept;
@@ -164,9 +167,11 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   void note_configured_anew() noexcept;
   void set_epoch();
   void keep_for_report();
+  std::vector<OutputStep> measured_steps(time_ns_t until_ns) const;
   static void renew_fallback(Change& change);
   static void settle_shadow(const DraftComponent& changed);
   void give_back_candidates() noexcept;
+  void give_back_candidate(const DraftComponent& changed) noexcept;
   void give_back_comebacks() noexcept;
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
 
@@ -231,6 +236,11 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   std::unique_ptr<Commit> commit_;
   std::map<std::string, Participant*> places_;  // by component
   bool committed_{false};
+  struct Swapped {
+    std::shared_ptr<Shadow> candidate{};
+    int step{0};
+  };
+  Swapped swapped_{};  // of a bumpless change
   Atomic<Phase> phase_{Phase::being_made};
   Atomic<bool> is_noted_{false};
   std::exception_ptr failure_{};  // of its retirement

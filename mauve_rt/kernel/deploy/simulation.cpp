@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <tuple>
+#include <utility>
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
@@ -109,25 +110,42 @@ Simulation::Next Simulation::next_of(Processor& processor) {
 }
 
 void Simulation::run_until(time_ns_t instant_ns) {
-  for (;;) {
-    Next next;
-    for (const auto& processor : processors_) {
-      const Next candidate = next_of(*processor);
-      if (candidate.begin_ns < next.begin_ns) next = candidate;
-    }
-    const time_ns_t timer = timers_.empty() ? kForever : timers_.begin()->instant_ns;
-    const time_ns_t first = std::min(timer, next.begin_ns);
-    if (first > instant_ns || first == kForever) break;
-    if (timer <= next.begin_ns) {
-      run_timer();
-      continue;
-    }
-    now_ns_ = std::max(now_ns_, next.begin_ns);
-    next.processor->clock.advance_to(next.begin_ns);
-    const TaskOfThread here(*next.task);
-    next.task->resume();
+  do {
+    if (failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
+  } while (step(instant_ns));
+}
+
+bool Simulation::step_in_change(time_ns_t until_ns) noexcept {
+  try {
+    return !failure_ && step(until_ns);
+  } catch (...) {
+    failure_ = std::current_exception();
+    return false;
   }
-  advance_to(instant_ns);
+}
+
+/// What comes first happens, if it comes by the instant; else time passes up to the instant, and this is false.
+bool Simulation::step(time_ns_t until_ns) {
+  Next next;
+  for (const auto& processor : processors_) {
+    const Next candidate = next_of(*processor);
+    if (candidate.begin_ns < next.begin_ns) next = candidate;
+  }
+  const time_ns_t timer = timers_.empty() ? kForever : timers_.begin()->instant_ns;
+  const time_ns_t first = std::min(timer, next.begin_ns);
+  if (first > until_ns || first == kForever) {
+    advance_to(until_ns);
+    return false;
+  }
+  if (timer <= next.begin_ns) {
+    run_timer();
+    return true;
+  }
+  now_ns_ = std::max(now_ns_, next.begin_ns);
+  next.processor->clock.advance_to(next.begin_ns);
+  const TaskOfThread here(*next.task);
+  next.task->resume();
+  return true;
 }
 
 void Simulation::run_timer() {
@@ -208,6 +226,10 @@ void SimulatedHost::shutdown() noexcept {
 const RealtimeStatus& SimulatedHost::realtime_status() const noexcept {
   static const RealtimeStatus none{.granted = false, .missing = {"simulated time: nothing ran in real time"}};
   return none;
+}
+
+bool SimulatedHost::pass_time(time_ns_t until_ns) noexcept {
+  return simulation_.step_in_change(until_ns);
 }
 
 void SimulatedHost::begin_task(Task& task) { task.simulate(processor_.clock, simulation_.options_.trace); }

@@ -75,12 +75,15 @@ Handover::~Handover() = default;
 
 bool Handover::adopt() const { return fresh_.adopt(stranger_ != nullptr ? *stranger_ : old_); }
 
+void Handover::copy() noexcept {
+  if (copies_.empty()) return;
+  is_whole_ = old_.store_state();
+  for (const Copy& copy : copies_) std::memcpy(copy.to, copy.from, copy.bytes);
+  fresh_.load_state();
+}
+
 void Handover::take() noexcept {
-  if (!copies_.empty()) {
-    is_whole_ = old_.store_state();
-    for (const Copy& copy : copies_) std::memcpy(copy.to, copy.from, copy.bytes);
-    fresh_.load_state();
-  }
+  copy();
   fresh_.take(stranger_ != nullptr ? *stranger_ : old_);
 }
 

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <utility>
 
+#include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
@@ -117,6 +119,15 @@ void Commit::refuse(const Participant* participant, const CommitAction& action, 
     refusal_state_.store(RefusalState::complete, std::memory_order_release);
   }
   call_off(Off::withdrawn, participant != nullptr ? participant->task : nullptr);
+}
+
+bool Commit::is_ready(Participant& participant) noexcept {
+  if (&participant != last_) return true;
+  participant.was_asked.store(true, std::memory_order_relaxed);  // relaxed: for a message
+  const bool is_last = to_vote_.load(std::memory_order_acquire) == 1;
+  bool are_ready = true;
+  for (CommitAction* action : participant.actions) are_ready &= action->is_ready(is_last);
+  return are_ready;
 }
 
 bool Commit::vote(Participant& participant, time_ns_t entered_ns) noexcept {
@@ -260,7 +271,8 @@ Commit::Outcome Commit::decide(time_ns_t until_ns, CommitGate& gate) noexcept {
   await_busy(until_ns);
   is_refused_ = refusal_state_.load(std::memory_order_acquire) == RefusalState::complete;
   if (is_refused_) return Outcome::refused;
-  return off() == Off::timed_out || off() == Off::not_idle ? Outcome::timed_out : Outcome::off;
+  const bool is_late = off() == Off::timed_out || off() == Off::not_idle || off() == Off::not_ready;
+  return is_late ? Outcome::timed_out : Outcome::off;
 }
 
 /// Nothing is held while a component has yet to take an earlier change. The gate does not know of this commit yet: a shutdown is
@@ -282,10 +294,14 @@ bool Commit::await_slots(time_ns_t until_ns, CommitGate& gate) noexcept {
 
 bool Commit::lock(time_ns_t until_ns) noexcept {
   const auto is_off = [this]() MAUVE_RT { return !cut_.look().is_open(); };
-  for (std::size_t i = 0; i < order_.size(); ++i) {
-    if (lock_unless(order_[i]->task->command_mutex(), until_ns, is_off)) continue;
-    if (!is_off()) locked_out_ = order_[i]->task;
-    while (i-- > 0) order_[i]->task->command_mutex().unlock();
+  for (Participant* participant : order_) {
+    Task& task = *participant->task;
+    // In virtual time a change that waits has it already: this one came while it lets time pass.
+    if (task.is_simulated() && task.command_mutex().is_held_here()) continue;
+    participant->has_command = lock_unless(task.command_mutex(), until_ns, is_off);
+    if (participant->has_command) continue;
+    if (!is_off()) locked_out_ = &task;
+    unlock();
     return false;
   }
   return true;
@@ -298,7 +314,9 @@ bool Commit::has_commands() const noexcept {
 }
 
 void Commit::unlock() noexcept {
-  for (Participant* participant : order_) participant->task->command_mutex().unlock();
+  for (Participant* participant : order_) {
+    if (std::exchange(participant->has_command, false)) participant->task->command_mutex().unlock();
+  }
 }
 
 const Task* Commit::find_unfit() const noexcept {
@@ -388,6 +406,8 @@ void Commit::visit_simulated() noexcept {
 void Commit::await_decision(time_ns_t until_ns) noexcept {
   const bool is_simulated = has_own() && order_.front()->task->is_simulated();
   bool have_all_voted = false;
+  if (last_ != nullptr) until_ns = later_by(monotonic_now_ns(), ready_within_ns_);
+  if (is_simulated) let_time_pass();
   while (cut_.look().is_open()) {
     const time_ns_t now = monotonic_now_ns();
     if (is_idle_ && !have_all_voted && to_vote_.load(std::memory_order_acquire) == 0) {
@@ -395,7 +415,7 @@ void Commit::await_decision(time_ns_t until_ns) noexcept {
       until_ns = later_by(now, idle_within_ns_);
     }
     if (now >= until_ns || is_simulated) {
-      call_off(have_all_voted ? Off::not_idle : Off::timed_out);
+      call_off(have_all_voted ? Off::not_idle : is_last_asked() ? Off::not_ready : Off::timed_out);
     } else {
       // Two that enter their waits at one moment may each see the other pending.
       if (have_all_voted && closer_ != nullptr) closer_->task->notify_commit();
@@ -403,6 +423,18 @@ void Commit::await_decision(time_ns_t until_ns) noexcept {
       futex_wait_until(decided_, 0, std::min(until_ns, now + kLook));
     }
   }
+}
+
+/// Whether only the last voter is missing, and knows of the change.
+bool Commit::is_last_asked() const noexcept {
+  return last_ != nullptr && to_vote_.load(std::memory_order_acquire) == 1 &&
+         last_->was_asked.load(std::memory_order_relaxed);
+}
+
+void Commit::let_time_pass() noexcept {
+  if (last_ == nullptr) return;
+  const time_ns_t until_ns = later_by(last_->task->clock().now_ns(), ready_within_ns_);
+  while (cut_.look().is_open() && runner_->pass_time(until_ns)) call_off_if_one_left();
 }
 
 /// A stop, a fault or a time-out wins: what it does not get to do itself is done here.
@@ -585,6 +617,7 @@ void Commit::throw_off() const {
     }
     case Off::not_idle:
       throw_not_idle();
+    case Off::not_ready:
     case Off::timed_out:
     case Off::not_yet:
       throw_timeout();

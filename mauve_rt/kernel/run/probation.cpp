@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 #include "mauve_rt/run/probation.hpp"
 
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
 #include "mauve_rt/run/component.hpp"
+
+#include "base/number_text.hpp"
 
 namespace mauve {
 
@@ -23,12 +23,6 @@ constexpr std::size_t kMostLimits = 1'000;
   throw Error(
       ErrorCode::invalid_argument, what,
       {.component = component, .element = element, .expected = expected, .found = found, .remedy = remedy});
-}
-
-std::string number_text(double number) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%g", number);
-  return text.data();
 }
 
 void check_bounds(const OutputLimit& limit, const std::string& component) {

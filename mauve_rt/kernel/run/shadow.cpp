@@ -94,10 +94,11 @@ Shadow::~Shadow() {
   clean_up();
 }
 
-void Shadow::prepare() {
+void Shadow::prepare(CoreBase& live) {
   try {
     connect_cells();
     bind();
+    if (!options_.is_fresh) handover_ = std::make_unique<Handover>(live, *parts_.core);
   } catch (const Error& error) {
     ErrorDetail detail = error.detail();
     if (detail.component.empty()) detail.component = component_;
@@ -149,21 +150,59 @@ void Shadow::bind() {
 
 // ---- the component's thread, or who acts for a parked component
 
-void Shadow::begin(const State* wait, time_ns_t now_ns) noexcept {
+void Shadow::begin(const State* wait, const CoreBase* live, time_ns_t now_ns) noexcept {
   begin_ns_ = now_ns;
+  if (handover_ != nullptr && live != nullptr && handover_->is_from(*live)) handover_->copy();
   std::uint32_t expected = kPrepared;
   // release: who finds it running finds its begin
   if (!phase_.compare_exchange_strong(expected, kRunning, std::memory_order_acq_rel)) return;
   capture_.attach(wait != nullptr ? static_cast<std::int64_t>(wait->index) : ShadowCapture::kStart);
 }
 
-void Shadow::end_release(time_ns_t instant_ns, const State* next_wait) noexcept {
-  if (phase_.load(std::memory_order_acquire) != kRunning) return;
+void Shadow::start() noexcept {
+  capture_.start();
+  awaits_outputs_.store(false, std::memory_order_release);  // what follows is no step of the swap
+}
+
+bool Shadow::end_release(time_ns_t instant_ns, const State* next_wait) noexcept {
+  if (awaits_outputs()) [[unlikely]]
+    return measure_steps();
+  if (phase_.load(std::memory_order_acquire) != kRunning) return false;
   const std::int64_t from =
       next_wait != nullptr ? static_cast<std::int64_t>(next_wait->index) : ShadowCapture::kStart;
-  if (!capture_.end_release(instant_ns, from)) return;
-  if (signal_ != nullptr) return signal_->bump();
-  MAUVE_RT_TRUSTED(run_pending());  // in virtual time, where nothing is real-time
+  if (!capture_.end_release(instant_ns, from)) return false;
+  if (signal_ != nullptr) {
+    signal_->bump();
+  } else {
+    MAUVE_RT_TRUSTED(run_pending());  // in virtual time, where nothing is real-time
+  }
+  return false;
+}
+
+bool Shadow::await_outputs() noexcept {
+  if (steps_ == nullptr) return false;
+  steps_->note_last([this](std::size_t port) MAUVE_RT { return capture_.present(port); });
+  capture_.forget_release();
+  awaits_outputs_.store(true, std::memory_order_release);
+  return true;
+}
+
+bool Shadow::measure_steps() noexcept {
+  steps_->note_first([this](std::size_t port) MAUVE_RT {
+    return capture_.is_noted(port) ? capture_.present(port) : nullptr;
+  });
+  capture_.forget_release();
+  if (!steps_->are_known()) return false;
+  awaits_outputs_.store(false, std::memory_order_release);
+  return true;
+}
+
+std::unique_ptr<CoreBase> Shadow::hand_over() noexcept {
+  if (!MAUVE_RT_TRUSTED(run_mutex_.try_lock())) return nullptr;  // it waits for no thread
+  std::unique_ptr<CoreBase> core;
+  if (phase_.load(std::memory_order_acquire) < kEnding) core = std::move(parts_.core);
+  MAUVE_RT_TRUSTED(run_mutex_.unlock());
+  return core;
 }
 
 void Shadow::conclude_if_hung(time_ns_t longest_ns) noexcept {
@@ -176,7 +215,7 @@ void Shadow::conclude_if_hung(time_ns_t longest_ns) noexcept {
 void Shadow::conclude(ShadowCause why, time_ns_t now_ns) noexcept {
   std::uint32_t seen = phase_.load(std::memory_order_acquire);
   do {
-    if (seen >= kEnding) return;
+    if (seen >= kEnding) return awaits_outputs_.store(false, std::memory_order_release);
     // acq_rel: one of all that would end it does
   } while (!phase_.compare_exchange_weak(seen, kEnding, std::memory_order_acq_rel));
   MAUVE_EXPECTS(why != ShadowCause::none);
@@ -188,7 +227,7 @@ void Shadow::conclude(ShadowCause why, time_ns_t now_ns) noexcept {
 
 // ---- changes
 
-std::unique_ptr<CoreBase> Shadow::suspend(time_ns_t timeout_ns) {
+std::unique_lock<Mutex> Shadow::lock_core(time_ns_t timeout_ns) {
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   std::unique_lock run(run_mutex_, std::defer_lock);
   while (!run.try_lock()) {
@@ -202,13 +241,32 @@ std::unique_ptr<CoreBase> Shadow::suspend(time_ns_t timeout_ns) {
     }
     sleep_for(kShadowLook);
   }
-  if (phase_.load(std::memory_order_acquire) == kRunning && parts_.core != nullptr)
-    return std::move(parts_.core);
+  if (phase_.load(std::memory_order_acquire) < kEnding && parts_.core != nullptr) return run;
   throw Error(ErrorCode::not_running, "the shadow has ended",
               {.component = component_,
                .element = "shadow " + core_,
                .found = record().reason,
                .remedy = "give the component a new shadow, or replace its core"});
+}
+
+std::unique_ptr<CoreBase> Shadow::suspend(time_ns_t timeout_ns) {
+  const auto run = lock_core(timeout_ns);
+  return std::move(parts_.core);
+}
+
+void Shadow::with_core(time_ns_t timeout_ns, const std::function<void(CoreBase&)>& use) {
+  const auto run = lock_core(timeout_ns);
+  use(*parts_.core);
+}
+
+void Shadow::await_near(const std::vector<GreatestStep>& outputs, Component& component,
+                        time_ns_t timeout_ns) {
+  auto steps = std::make_unique<OutputSteps>(component.shell(), component_, outputs);
+  const auto run = lock_core(timeout_ns);
+  near_.store(kNeverNear, std::memory_order_release);
+  const LockGuard lock(figures_mutex_);
+  steps_ = std::move(steps);
+  awaiting_.set(component.task());
 }
 
 void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
@@ -254,6 +312,7 @@ ShadowRecord Shadow::record() const {
   record.over_budget = figures_.over_budget;
   record.largest_execution_ns = figures_.largest_execution_ns;
   for (const auto& [place, comparison] : comparisons_) record.outputs.push_back(comparison.difference());
+  if (steps_ != nullptr) record.steps = steps_->shown();
   return record;
 }
 
@@ -274,7 +333,7 @@ std::string Shadow::reason() const {
     case ShadowCause::hung:
       return "hung: state " + TraceNames::word(machine_.state_name()) + " of the candidate did not end";
     case ShadowCause::lost:
-      return "a step promote was refused, and the candidate was cleaned up";
+      return "the change was refused, and the candidate was cleaned up";
   }
   return {};
 }

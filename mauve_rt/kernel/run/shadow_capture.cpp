@@ -99,7 +99,15 @@ void ShadowCapture::detach() noexcept {
 void ShadowCapture::start() noexcept {
   from_ = kStart;
   is_anew_ = true;
+  forget_release();
+}
+
+void ShadowCapture::forget_release() noexcept {
   for (PortNote& note : present_.notes) note.is_noted = false;
+}
+
+const std::byte* ShadowCapture::present(std::size_t port) const noexcept {
+  return present_.values.data() + ports_[port]->offset;
 }
 
 bool ShadowCapture::end_release(time_ns_t instant_ns, std::int64_t next_from) noexcept {

@@ -2,6 +2,7 @@
 // How a shadow executes its candidate: on the shadow's thread, or in a simulation.
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/run/shadow.hpp"
+#include "mauve_rt/run/task.hpp"
 
 #include "run/still_clock.hpp"
 
@@ -32,7 +33,17 @@ class WithoutRing {
 }  // namespace
 
 bool Shadow::run_pending() noexcept {
-  const LockGuard run(run_mutex_);
+  bool has_run = false;
+  {
+    const LockGuard run(run_mutex_);
+    has_run = run_oldest();
+  }
+  // The component's thread may take the core out right away: it finds the mutex free.
+  if (has_run && is_near()) awaiting_.use([](Task& task) { task.notify_commit(); });
+  return has_run;
+}
+
+bool Shadow::run_oldest() noexcept {
   const ShadowCapture::Release* const release = capture_.front();
   if (phase_.load(std::memory_order_acquire) != kRunning || release == nullptr || parts_.core == nullptr)
     return false;
@@ -114,8 +125,12 @@ bool Shadow::advance_to(const ShadowCapture::Release& release) {
 void Shadow::compare(const ShadowCapture::Release& release) {
   for (auto& [place, comparison] : comparisons_) {
     const void* const live = capture_.note(place).is_noted ? capture_.value(place) : nullptr;
-    comparison.add(release.number, live, cells_[place]->take_written());
+    const void* const candidate = cells_[place]->take_written();
+    comparison.add(release.number, live, candidate);
+    if (steps_ != nullptr) steps_->note(place, live, candidate);
   }
+  if (steps_ == nullptr || !steps_->compare(release.instant_ns)) return;
+  near_.store(release.number + 1, std::memory_order_release);
 }
 
 void Shadow::count_execution(time_ns_t execution_ns) {

@@ -21,7 +21,11 @@ constexpr std::int64_t kInVain = 2;  // of an armed record: it went on without t
 bool Task::wait_slot(time_ns_t until_ns) noexcept {
   std::uint32_t seen = slot_.load(std::memory_order_acquire);
   while ((seen & kSlot) != kEmpty) {
-    if (simulated_) return false;
+    if (simulated_) {
+      // A change that lets time pass may have been called off meanwhile: it retracts nothing before it comes back.
+      Participant& posted = *participant_.load(std::memory_order_relaxed);
+      return posted.commit->look().is_off() && retract(posted, until_ns);
+    }
     if (slot_.compare_exchange_weak(seen, seen | kWaited, std::memory_order_acq_rel) &&
         !futex_wait_until(slot_, seen | kWaited, until_ns))
       return (slot_.load(std::memory_order_acquire) & kSlot) == kEmpty;
@@ -111,7 +115,7 @@ Task::Visit Task::visit_slot() noexcept {
   }
   const time_ns_t began = clock().now_ns();
   if (!participant.has_voted) {
-    if (!fits_in_wait(participant)) {
+    if (!fits_in_wait(participant) || !participant.commit->is_ready(participant)) {
       leave_slot(kPosted);
       return Visit::goes_on;
     }

@@ -6,16 +6,22 @@
 namespace mauve {
 
 void Task::set_shadow(Shadow& shadow) noexcept {
-  shadow.begin(machine_.present_wait(), clock().now_ns());
+  shadow.begin(machine_.present_wait(), machine_.core(), clock().now_ns());
   shadow_.set(shadow);
 }
 
 void Task::end_shadow(ShadowCause why) noexcept {
   if (!shadow_.is_set()) return;
+  bool is_over = true;
   shadow_.use([&](Shadow& shadow) {
     shadow.conclude(why, clock().now_ns());
-    shadow.detach();
+    is_over = why != ShadowCause::promotion || !machine_.is_started() || !shadow.await_outputs();
   });
+  if (is_over) leave_shadow();
+}
+
+void Task::leave_shadow() noexcept {
+  shadow_.use([](Shadow& shadow) { shadow.detach(); });
   shadow_.revoke(kForever);  // waits for no thread: who runs the machine is the only user
 }
 
@@ -25,7 +31,11 @@ void Task::start_shadow() noexcept {
 
 /// A release has reached its next wait.
 void Task::capture_release() noexcept {
-  shadow_.use([this](Shadow& shadow) { shadow.end_release(machine_.entered_ns(), machine_.present_wait()); });
+  bool is_over = false;
+  shadow_.use([&](Shadow& shadow) {
+    is_over = shadow.end_release(machine_.entered_ns(), machine_.present_wait());
+  });
+  if (is_over) leave_shadow();
 }
 
 }  // namespace mauve

@@ -17,6 +17,7 @@ constexpr StepKind steps::place_core{
       changed.fresh.core = std::move(core);
       changed.core_step = draft.step();
       changed.probation.reset();
+      changed.bumpless.reset();
       changed.core_unready = !changed.is_added;  // an added one is configured as a whole
     }};
 

@@ -1,13 +1,8 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The candidate of a component's shadow becomes the component's core, with the state that it has.
+// The candidate of a component's shadow becomes the component's core.
 #include "change/steps/step_kind.hpp"
 
 namespace mauve {
-
-namespace {
-
-/// For a state of the candidate to end, on a thread that gets little time.
-}  // namespace
 
 constexpr StepKind steps::promote{
     .name = "promote", .element = "core", .draft = [](Draft& draft, TransactionStep& step) {
@@ -21,6 +16,10 @@ constexpr StepKind steps::promote{
                      .expected = "a shadow that runs",
                      .found = "none",
                      .remedy = "give it a shadow first, or replace its core"});
+      }
+      if (const auto* options = std::get_if<PromoteOptions>(&step.value)) {
+        changed.bumpless = options->bumpless;
+        changed.is_fresh = options->is_fresh;
       }
       changed.promoted = shadow;
       changed.core_step = draft.step();

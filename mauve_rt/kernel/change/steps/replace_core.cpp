@@ -18,15 +18,16 @@ void allow_first_core(DraftComponent& added, const CoreBase& core) {
 }
 
 std::string core_words(const TransactionStep& step) {
-  const auto* trial = std::get_if<CoreOnProbation>(&step.value);
-  if (trial == nullptr) return part_words<CoreBase>(step);
-  return step.target + " " + (trial->core != nullptr ? shown({}, trial->core) : step.name) + " on probation";
+  const auto* with = std::get_if<CoreWithOptions>(&step.value);
+  if (with == nullptr) return part_words<CoreBase>(step);
+  return step.target + " " + (with->core != nullptr ? shown({}, with->core) : step.name) +
+         (with->options.bumpless ? " bumpless" : "") + (with->options.probation ? " on probation" : "");
 }
 
 /// The core that the step brings; nullptr: it names one.
 std::unique_ptr<CoreBase>* find_object(TransactionStep& step) {
-  if (auto* trial = std::get_if<CoreOnProbation>(&step.value))
-    return step.name.empty() ? &trial->core : nullptr;
+  if (auto* with = std::get_if<CoreWithOptions>(&step.value))
+    return step.name.empty() ? &with->core : nullptr;
   return brings<CoreBase>(step) ? &value_of<std::unique_ptr<CoreBase>>(step) : nullptr;
 }
 
@@ -49,8 +50,11 @@ constexpr StepKind steps::replace_core{.name = "replace_core",
                                          changed.core_step = draft.step();
                                          changed.core_unready = false;
                                          changed.probation.reset();
-                                         if (const auto* trial = std::get_if<CoreOnProbation>(&step.value))
-                                           changed.probation = trial->options;
+                                         changed.bumpless.reset();
+                                         if (const auto* with = std::get_if<CoreWithOptions>(&step.value)) {
+                                           changed.probation = with->options.probation;
+                                           changed.bumpless = with->options.bumpless;
+                                         }
                                        }};
 
 }  // namespace mauve

@@ -4,9 +4,7 @@
 
 namespace mauve {
 
-namespace {
-
-void require_free(const Draft& draft, const DraftComponent& changed) {
+void require_no_shadow(const Draft& draft, const DraftComponent& changed) {
   if (!draft.is_deployed() || changed.is_added) {
     throw Error(ErrorCode::not_configured, "only a component of a deployed architecture has a shadow",
                 {.component = changed.name(), .element = "shadow", .remedy = "deploy it first"});
@@ -26,7 +24,7 @@ void require_free(const Draft& draft, const DraftComponent& changed) {
                .remedy = "end the other shadow in a transaction before"});
 }
 
-std::unique_ptr<Shell> make_shell(const Component& component) {
+std::unique_ptr<Shell> make_shadow_shell(const Component& component) {
   std::unique_ptr<Shell> shell = component.shell().another();
   if (shell != nullptr) return shell;
   throw Error(ErrorCode::prepare_failed, "a shadow needs another instance of the component's shell",
@@ -35,7 +33,7 @@ std::unique_ptr<Shell> make_shell(const Component& component) {
                .remedy = "give the step a shell as an object"});
 }
 
-std::unique_ptr<FsmBase> make_fsm(const Component& component) {
+std::unique_ptr<FsmBase> make_shadow_fsm(const Component& component) {
   std::unique_ptr<FsmBase> fsm = component.fsm().another();
   if (fsm != nullptr) return fsm;
   throw Error(ErrorCode::prepare_failed, "a shadow needs another instance of the fsm, and none can be made",
@@ -43,6 +41,8 @@ std::unique_ptr<FsmBase> make_fsm(const Component& component) {
                .element = component.fsm().description(),
                .remedy = "give the component a factory of its fsm"});
 }
+
+namespace {
 
 std::string shadow_words(const TransactionStep& step) {
   const auto* wanted = std::get_if<CoreInShadow>(&step.value);
@@ -59,14 +59,14 @@ constexpr StepKind steps::shadow{
     .draft = [](Draft& draft, TransactionStep& step) {
       auto& wanted = value_of<CoreInShadow>(step);
       DraftComponent& changed = replacing(draft, step.target);
-      require_free(draft, changed);
+      require_no_shadow(draft, changed);
       Component& component = *changed.component;
       component.settle_shadow();
       ShadowParts parts{.shell = std::move(wanted.shell)};
       parts.core = step.name.empty() ? take(wanted.core) : draft.registry().make_core(step.name);
       if (!step.name.empty()) component.check_allowed(parts.core->implementation());
-      if (parts.shell == nullptr) parts.shell = make_shell(component);
-      parts.fsm = make_fsm(component);
+      if (parts.shell == nullptr) parts.shell = make_shadow_shell(component);
+      parts.fsm = make_shadow_fsm(component);
       changed.shadow = std::make_shared<Shadow>(component, std::move(parts), wanted.options);
       changed.shadow_step = draft.step();
     }};

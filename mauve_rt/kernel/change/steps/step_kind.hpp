@@ -109,6 +109,12 @@ std::string part_words(const TransactionStep& step) {
   return step.target + " " + (part != nullptr ? shown({}, *part) : step.name);
 }
 
+/// A shell and an fsm of the component's classes, for a shadow. Throws Error (prepare_failed): none can be made.
+std::unique_ptr<Shell> make_shadow_shell(const Component& component);
+std::unique_ptr<FsmBase> make_shadow_fsm(const Component& component);
+/// Throws Error: it has a shadow that runs, or is FAULTED, or not deployed.
+void require_no_shadow(const Draft& draft, const DraftComponent& changed);
+
 /// The component whose part is to be replaced. Throws Error.
 DraftComponent& replacing(Draft& draft, const std::string& component);
 /// Throws Error (invalid_argument) when a step before has promoted the candidate of its shadow.

@@ -38,6 +38,10 @@ class Runner {
   /// Whether nothing happens while the caller waits: time is virtual, and the caller's thread is the one that it passes on.
   virtual bool is_simulated() const noexcept = 0;
 
+  /// In virtual time: what comes next happens, if it comes by the instant; else time passes up to the instant. False: it is reached,
+  /// or time passes by itself. [non-rt]
+  virtual bool pass_time(time_ns_t /*until_ns*/) noexcept { return false; }
+
   /// Gives a parked component what it runs on. [non-rt] Throws Error.
   virtual void attach(const std::shared_ptr<Component>& component) = 0;
   /// How long the end of a thread is waited for.

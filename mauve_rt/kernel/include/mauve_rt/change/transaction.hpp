@@ -51,10 +51,24 @@ struct NewResource {
   Frames frames{};
 };
 
-/// A core to be put in on probation: by the step's name, or as an object.
-struct CoreOnProbation {
+/// How a core is put in.
+struct ReplaceOptions {
+  std::optional<ProbationOptions> probation{};  // probation.hpp
+  /// Of a component that runs: only where its outputs are near those of the core that it replaces (output_steps.hpp). Until then it
+  /// executes in the component's shadow. Of one that is STOPPED it goes in at once.
+  std::optional<BumplessOptions> bumpless{};
+};
+
+/// A core to be put in with options: by the step's name, or as an object.
+struct CoreWithOptions {
   std::unique_ptr<CoreBase> core{};
-  ProbationOptions options{};
+  ReplaceOptions options{};
+};
+
+/// How the candidate of a shadow becomes the core.
+struct PromoteOptions {
+  std::optional<BumplessOptions> bumpless{};  // as in ReplaceOptions; its budget counts for nothing, the shadow has one
+  bool is_fresh{false};                       // it gets no copies of the state fields of the core that it replaces
 };
 
 /// A core to execute in a component's shadow: by the step's name, or as an object. Without a shell as an object, the registry makes
@@ -68,7 +82,7 @@ struct CoreInShadow {
 /// What a step puts in, as its kind takes it.
 using StepValue =
     std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>, std::unique_ptr<FsmBase>,
-                 std::unique_ptr<Shell>, NewComponent, NewResource, CoreOnProbation, CoreInShadow>;
+                 std::unique_ptr<Shell>, NewComponent, NewResource, CoreWithOptions, PromoteOptions, CoreInShadow>;
 
 struct StepKind;
 
@@ -123,6 +137,12 @@ class Transaction {
                             ProbationOptions options);
   Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
                             ProbationOptions options);
+  /// With any options. A bumpless change is of one deployed component, with no new shell or fsm, wiring or property of it, no configure
+  /// step, and nothing but read, write and event ports of trivially copyable types, as a shadow.
+  Transaction& replace_core(const std::string& component, const std::string& implementation,
+                            ReplaceOptions options);
+  Transaction& replace_core(const std::string& component, std::unique_ptr<CoreBase> core,
+                            ReplaceOptions options);
   /// Executes a candidate core in the component's shadow (shadow.hpp); the live core stays. Of a deployed component that runs or is
   /// STOPPED and has no shadow, whose parts and wiring the transaction leaves alone. By name as in replace_core(). As an object:
   /// `shell` is another instance of the component's shell class; nullptr: the registry makes it.
@@ -134,8 +154,9 @@ class Transaction {
   Transaction& bring_back(const std::string& component);
   /// Ends the component's shadow; without a shadow there is nothing to do.
   Transaction& end_shadow(const std::string& component);
-  /// Replaces the live core by the candidate of the component's shadow, which keeps its own state: nothing is handed over.
-  Transaction& promote(const std::string& component);
+  /// Replaces the live core by the candidate of the component's shadow. It gets copies of the live core's state fields of the same name
+  /// and type, and keeps its own state besides; in a bumpless change it keeps all of its own state, with which its outputs were near.
+  Transaction& promote(const std::string& component, PromoteOptions options = {});
   /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
   Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);
   /// The new fsm goes on in the wait of the same name, where it has one in a cycle with its initial state and the pending

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <exception>
 #include <functional>
 #include <memory>
 #include <set>
@@ -49,7 +50,8 @@ class Simulation;
 
 /// The host of one architecture in virtual time; made by Simulation::add(). Preparing a change takes no virtual time:
 /// it is reported as 0, and so is what of a commit comes only when the call has returned. From callbacks, or between
-/// two run_until(). The simulating thread only.
+/// two run_until(). The simulating thread only. A bumpless change lets virtual time pass until it is made: other callbacks and the
+/// components run meanwhile.
 class SimulatedHost final : public Host {
  public:
   SimulatedHost(Simulation& simulation, Architecture& architecture);
@@ -65,6 +67,7 @@ class SimulatedHost final : public Host {
   const RealtimeStatus& realtime_status() const noexcept override;
   const Clock& clock() const noexcept override { return processor_.clock; }
   bool is_simulated() const noexcept override { return true; }
+  bool pass_time(time_ns_t until_ns) noexcept override;
 
   /// The simulated task itself executes it after each release.
   void run_shadow(const std::shared_ptr<Shadow>& /*shadow*/) override {}
@@ -145,6 +148,8 @@ class Simulation {
   };
 
   static Next next_of(Processor& processor);
+  bool step(time_ns_t until_ns);
+  bool step_in_change(time_ns_t until_ns) noexcept;
   void run_timer();
   void advance_to(time_ns_t instant_ns);
 
@@ -155,6 +160,7 @@ class Simulation {
   std::vector<Processor*> processors_;                 // of those that were not
   std::set<Timer> timers_;
   std::uint64_t timers_set_{0};
+  std::exception_ptr failure_{};  // of a callback while a change let time pass: run_until() throws it
 };
 
 }  // namespace mauve

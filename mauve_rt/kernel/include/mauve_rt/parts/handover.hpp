@@ -31,6 +31,8 @@ class Handover {
   bool adopt() const;
   /// Copies the matching fields, then CoreBase::take. [rt] as far as the cores are.
   void take() noexcept;
+  /// Copies the matching fields, and leaves the old core as it is. [rt] as far as the cores are.
+  void copy() noexcept;
 
   /// Names of the fields that are taken over. [non-rt]
   const std::vector<std::string>& taken() const noexcept { return taken_; }

@@ -17,6 +17,7 @@ namespace mauve {
 
 class CommitGate;
 class Publication;
+class Runner;
 class Task;
 
 /// One part of a change. Prepared on an ordinary thread; adopt and take run on the thread of the component that the action
@@ -33,6 +34,9 @@ class CommitAction {
   virtual bool make_safe(bool /*may_wait*/, time_ns_t /*time_ns*/) MAUVE_RT { return true; }
   /// The time that adopt and take declare to need together; 0: none declared. [rt]
   virtual time_ns_t declared_ns() const MAUVE_RT { return 0; }
+  /// Whether the component may vote in this wait; `is_last`: all others have voted. Asked of the last voter (Commit::set_last()) in each
+  /// wait until it says so; what it says then holds until the vote. [rt], the component's thread
+  virtual bool is_ready(bool /*is_last*/) noexcept { return true; }
   /// The action's name in the trace. [rt]
   virtual std::uint32_t trace_id() const MAUVE_RT { return 0; }
 
@@ -57,8 +61,9 @@ class Commit;
 /// | member            | written by                                        | read by       | order                   |
 /// | ----------------- | ------------------------------------------------- | ------------- | ----------------------- |
 /// | task ... is_own   | requester, before it posts                        | anyone after  | the task's slot         |
+/// | has_command       | requester                                         | requester     | -                       |
 /// | has_voted         | who votes for it: its thread, else the requester  | the same      | the task's slot         |
-/// | unfit_waits ...   | the component's thread                            | requester     | relaxed: lone facts     |
+/// | was_asked ...     | the component's thread                            | requester     | relaxed: lone facts     |
 /// | visit_ns          |                                                   |               |                         |
 /// | parked ... shift  | who takes for it, before it passes                | requester     | passed                  |
 /// | passed            | who takes for it                                  | requester     | release/acquire         |
@@ -85,7 +90,9 @@ struct Participant {
   /// It has nothing to take: it votes, so that no job of its is pending at T (set_idle).
   bool is_silent{false};
   bool has_voted{false};
+  bool has_command{false};  // the requester has its command mutex, and is to unlock it
 
+  Atomic<bool> was_asked{false};         // whether it is ready
   Atomic<std::uint32_t> unfit_waits{0};  // waits that the declared budget did not fit in
   Atomic<bool> has_agreed{false};        // it has voted, for a message
   Atomic<time_ns_t> visit_ns{0};         // when its adopt or take began; 0: neither is under way
@@ -165,7 +172,7 @@ class Commit {
     changed,    // a participant is STOPPING or FAULTED
     stale,      // the architecture is not the one that it was prepared for
   };
-  enum class Off : std::uint8_t { not_yet, timed_out, not_idle, withdrawn, shut_down, preempted, abandoned };
+  enum class Off : std::uint8_t { not_yet, timed_out, not_idle, not_ready, withdrawn, shut_down, preempted, abandoned };
 
   /// Actions without a task are checks: their adopt runs on the requester, before it posts.
   Commit(std::size_t participants, std::vector<CommitAction*> actions);
@@ -198,6 +205,15 @@ class Commit {
   }
   /// [rt]
   bool is_idle() const MAUVE_RT { return is_idle_; }
+  /// The participant, which runs, votes after all others, once its actions are ready. The change is called off when they are not so
+  /// long after it was posted. In virtual time the runner lets that time pass. [setup]
+  void set_last(Participant& participant, time_ns_t within_ns, Runner& runner) noexcept {
+    last_ = &participant;
+    ready_within_ns_ = within_ns;
+    runner_ = &runner;
+  }
+  /// Whether the participant may vote in this wait. [rt], the participant's thread
+  bool is_ready(Participant& participant) MAUVE_RT;
   /// It is for threads that run: it ends when they are shut down. [setup]
   void set_hosted() noexcept { is_hosted_ = true; }
   /// What it makes of the table. [setup]
@@ -302,6 +318,8 @@ class Commit {
   void vote_for_parked() noexcept;
   void visit_simulated() noexcept;
   void await_decision(time_ns_t until_ns) noexcept;
+  void let_time_pass() noexcept;
+  bool is_last_asked() const noexcept;
   void call_off_if_one_left() noexcept;
   void retract_posted() noexcept;
   void await_busy(time_ns_t until_ns) noexcept;
@@ -323,6 +341,9 @@ class Commit {
   bool is_structural_{false};
   bool is_idle_{false};
   time_ns_t idle_within_ns_{0};
+  Participant* last_{nullptr};  // votes last; nullptr: in any order
+  time_ns_t ready_within_ns_{0};
+  Runner* runner_{nullptr};
   bool is_one_cpu_{false};
   const Participant* closer_{nullptr};           // the lowest that runs; nullptr: all are parked
   Atomic<const Participant*> pending_{nullptr};  // at the last look for an idle instant

@@ -42,6 +42,7 @@ struct StepReport {
   time_ns_t release_ns{kNotMeasured};   // nominal instant of the release that followed
   std::vector<std::string> taken{};     // state fields that the new core took over
   std::vector<std::string> left{};      // state fields that it did not, with the reason
+  std::vector<OutputStep> outputs{};    // of a bumpless change, as it listed them
 };
 
 struct CommitTimeouts {
@@ -87,6 +88,9 @@ class PartsChange final : public CommitAction {
   /// A new shell takes the property values of the old one where name, type and range fit. With a new shell and no new
   /// fsm, another instance of the present fsm is made. [non-rt] Throws Error (prepare_failed) when that cannot be made.
   PartsChange(Component& component, Parts fresh);
+  /// The new core is this candidate, which goes in where its outputs are near those of the core that runs (Shadow::await_near()). It
+  /// executes in the component's shadow until then, and keeps the state that it has. [non-rt] Throws as Shadow::with_core().
+  PartsChange(Component& component, std::shared_ptr<Shadow> candidate);
   ~PartsChange() override;
 
   /// The shell that will be in force: where properties of a new one are set and its ports connected. [non-rt]
@@ -111,8 +115,13 @@ class PartsChange final : public CommitAction {
   /// Gives the probation away; nullptr: there is none. [non-rt]
   std::shared_ptr<Probation> release_probation() noexcept { return std::move(probation_); }
   bool has_probation() const noexcept { return probation_ != nullptr; }
-  /// The new core is the candidate of the component's shadow, and keeps the state that it has. [setup]
-  void promote() noexcept { afresh_ = promotes_ = true; }
+  /// The new core is the candidate of the component's shadow. Unless it is `fresh` it gets copies of the old core's state fields. [setup]
+  void promote(bool is_fresh) noexcept {
+    promotes_ = true;
+    afresh_ = is_fresh;
+  }
+  /// The candidate that goes in where its outputs are near; nullptr: none. [non-rt]
+  const std::shared_ptr<Shadow>& candidate() const noexcept { return candidate_; }
   /// After take, of a core, or of an fsm and a core: exchanges the parts once more. No code of theirs runs. A running component
   /// goes on in the wait of the same name; before its first release, and after a fault, the caller starts it anew
   /// (Task::keep_place()). [rt]
@@ -134,6 +143,7 @@ class PartsChange final : public CommitAction {
   void take_core_back(std::unique_ptr<CoreBase> core) noexcept { parts_.core = std::move(core); }
   bool was_taken() const noexcept { return taken_; }
 
+  bool is_ready(bool is_last) noexcept override;
   bool adopt() override;
   void take() noexcept override;
   bool make_safe(bool may_wait, time_ns_t time_ns) noexcept override;
@@ -142,6 +152,7 @@ class PartsChange final : public CommitAction {
 
  private:
   void prepare_parts();
+  void prepare_candidate();
   void prepare_way_back();
   void exchange_core() MAUVE_RT;
   void exchange_fsm() MAUVE_RT;
@@ -161,6 +172,8 @@ class PartsChange final : public CommitAction {
   const ShownCore* shown_core_{nullptr};  // of the core that is not in force
   bool fallen_back_{false};               // whether the component runs its fallback core, with that core
   std::shared_ptr<Probation> probation_{};
+  std::shared_ptr<Shadow> candidate_{};
+  time_ns_t budget_ns_{0};  // of the candidate's adopt and take
   bool afresh_{false};
   bool promotes_{false};
   bool unready_{false};

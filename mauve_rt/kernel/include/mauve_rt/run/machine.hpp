@@ -85,6 +85,8 @@ class Machine {
 
   /// [rt]
   void set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_ns) MAUVE_RT;
+  /// The core that it runs; nullptr: none is bound. [rt]
+  const CoreBase* core() const MAUVE_RT { return core_ != nullptr ? core_->core : nullptr; }
   /// Releases of another clock's time are no more. [rt]
   void set_clock(const Clock& clock) MAUVE_RT {
     clock_ = &clock;

@@ -3,31 +3,40 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
+#include <limits>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "mauve_rt/base/revocable_reference.hpp"
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
 #include "mauve_rt/base/seam/mutex.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/parts/core.hpp"
 #include "mauve_rt/parts/fsm.hpp"
+#include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/parts/property.hpp"
 #include "mauve_rt/run/machine.hpp"
 #include "mauve_rt/run/output_comparison.hpp"
+#include "mauve_rt/run/output_steps.hpp"
 #include "mauve_rt/run/shadow_capture.hpp"
 
 namespace mauve {
 
 class Component;
+class Task;
 struct ShadowSignal;
 
 struct ShadowOptions {
   /// > 0: what the candidate may execute per release, on average. After a release that took n budgets, n - 1 releases are skipped.
   /// On threads CPU time of the shadow's thread; in virtual time what the states declare (simulated_execution).
   time_ns_t budget_ns{0};
+  /// The candidate begins with its own values, not with the state fields of the live core.
+  bool is_fresh{false};
 };
 
 /// Numbered for services: fields are added at the end.
@@ -70,6 +79,7 @@ struct ShadowRecord {
   time_ns_t budget_ns{0};
   time_ns_t largest_execution_ns{0};        // of one release
   std::vector<OutputDifference> outputs{};  // by write port
+  std::vector<OutputStep> steps{};          // of a bumpless change, as it listed them
 };
 
 /// The parts of a candidate: a shell of the component's own class, the core, another instance of the component's fsm.
@@ -84,8 +94,8 @@ struct ShadowParts {
 /// candidate writes goes to cells, and is compared with what the live core wrote in that release. In virtual time the simulation
 /// does this right after the release, at the same instant, and no virtual time passes.
 ///
-/// The candidate begins in the wait in which the live core is, and goes its own way from there; it begins anew in the initial state
-/// when the component is started. Of each captured release it executes one chain of states, where its own wait has ended by that
+/// The candidate begins in the wait in which the live core is, with copies of the live core's state fields of the same name and type
+/// (MAUVE_STATE), and goes its own way from there; it begins anew in the initial state when the component is started. Of each captured release it executes one chain of states, where its own wait has ended by that
 /// instant; instants that were skipped are left out, as after an overrun. Events that it raises have no effect.
 ///
 /// The shadow ends with a fault of the candidate, when a state of it hangs (its thread is left behind then, until the state ends), by a step end_shadow or promote, when the component's parts or wiring change, when
@@ -101,6 +111,11 @@ struct ShadowParts {
 /// | parts_ ... debt_  | who executes, prepares, suspends, retires   | same                   | run_mutex_                           |
 /// | figures_ ... properties_ | who executes, or sets              | anyone but the component's thread | figures_mutex_           |
 /// | signal_           | before it begins                            | the component's thread | the commit publishes it              |
+/// | handover_         | [setup]                                     | who begins it          | -                                    |
+/// | steps_            | who makes it wait for near outputs          | who executes, or tells; the component's thread | figures_mutex_; the commit publishes it |
+/// | near_             | who executes, who makes it wait             | the component's thread | release/acquire: the candidate's state after that release |
+/// | awaiting_         | who makes it wait                           | who executes           | its own: base/revocable_reference.hpp |
+/// | awaits_outputs_   | the component's thread, who closes it       | anyone                 | release/acquire: the steps           |
 /// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
@@ -108,35 +123,52 @@ struct ShadowParts {
 /// The component's thread takes neither mutex, but in virtual time, where there is one thread.
 class Shadow {
  public:
+  /// A change waits so long for a state of the candidate to end, on a thread that gets little time.
+  static constexpr time_ns_t kStateEnd = s_to_ns(1);
+
   /// Throws Error: invalid_argument (budget), type_mismatch, out_of_range (ports). [non-rt]
   Shadow(Component& component, ShadowParts parts, ShadowOptions options);
   ~Shadow();
   Shadow(const Shadow&) = delete;
   Shadow& operator=(const Shadow&) = delete;
 
-  /// Connects, binds and configures the candidate's parts. [non-rt] Throws Error.
-  void prepare();
+  /// Connects, binds and configures the candidate's parts; it is to begin with the state of this core. [non-rt] Throws Error.
+  void prepare(CoreBase& live);
   /// Whom the component's thread wakes; nullptr: the simulation executes it. [non-rt], before it begins.
   void set_signal(std::shared_ptr<ShadowSignal> signal) noexcept { signal_ = std::move(signal); }
 
   // ---- the component's thread, or who acts for a parked component
 
-  /// Captures from now on; the component is in this wait, or in none. [rt]
-  void begin(const State* wait, time_ns_t now_ns) MAUVE_RT;
+  /// Captures from now on; the component is in this wait, or in none, with this core. [rt] as far as the cores' state fields are.
+  void begin(const State* wait, const CoreBase* live, time_ns_t now_ns) MAUVE_RT;
+  bool has_begun() const MAUVE_RT { return phase_.load(std::memory_order_acquire) != kPrepared; }
   /// The component starts in its initial state. [rt]
-  void start() MAUVE_RT { capture_.start(); }
-  /// A release has reached its next wait. [rt]
-  void end_release(time_ns_t instant_ns, const State* next_wait) MAUVE_RT;
+  void start() MAUVE_RT;
+  /// A release has reached its next wait. Whether it is the last that is looked at. [rt]
+  bool end_release(time_ns_t instant_ns, const State* next_wait) MAUVE_RT;
   /// Ends it; does nothing when it has ended before. [rt], any thread
   void conclude(ShadowCause why, time_ns_t now_ns) MAUVE_RT;
   /// Captures no more: the component's ports refer to it no longer. [rt], or an ordinary thread that has claimed the component
   void detach() MAUVE_RT { capture_.detach(); }
   bool has_ended() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kEnded; }
 
+  // ---- a bumpless change: the candidate goes in where its outputs are near
+
+  /// Whether each listed output was near in the component's last release. [rt], the component's thread
+  bool is_near() const MAUVE_RT { return near_.load(std::memory_order_acquire) == capture_.captured(); }
+  /// The candidate's core, which executes no more here; nullptr: the shadow's thread looks at it this moment, or it has ended. [rt]
+  std::unique_ptr<CoreBase> hand_over() MAUVE_RT;
+  /// It was promoted: measures the first value of each listed output. Whether there is one to measure. [rt], the component's thread
+  bool await_outputs() MAUVE_RT;
+
   /// Ends it when a release of the candidate executes for longer than this. [non-rt]
   void conclude_if_hung(time_ns_t longest_ns) noexcept;
+  /// It was promoted, and a listed output of the new core is yet to be measured. [rt], any thread
+  bool awaits_outputs() const MAUVE_RT { return awaits_outputs_.load(std::memory_order_acquire); }
   /// It has ended, and the component's ports still refer to it. [rt], any thread
-  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached(); }
+  bool is_to_settle() const MAUVE_RT {
+    return has_ended() && capture_.is_attached() && !awaits_outputs();
+  }
 
   // ---- who executes: the shadow's thread, or a simulation
 
@@ -152,6 +184,15 @@ class Shadow {
   /// Takes the candidate's core out: it executes no more until resume(). [non-rt] Throws Error: timeout naming the state that still
   /// executes; not_running: it has ended.
   std::unique_ptr<CoreBase> suspend(time_ns_t timeout_ns);
+  /// Calls the function with the candidate's core, which executes nothing meanwhile. [non-rt] Throws as suspend().
+  void with_core(time_ns_t timeout_ns, const std::function<void(CoreBase&)>& use);
+  /// What the candidate takes over from the live core as it begins; nullptr: nothing. [non-rt], after prepare()
+  const Handover* handover() const noexcept { return handover_.get(); }
+  /// From now on the task is woken when the listed outputs are near. [non-rt] Throws Error: not_running (it waits for another change),
+  /// and as OutputSteps.
+  void await_near(const std::vector<GreatestStep>& outputs, Component& component, time_ns_t timeout_ns);
+  /// The reverse: the task is woken no more. [non-rt]
+  void end_await() noexcept { awaiting_.revoke(kForever); }
   /// Puts that core back in, after a refused change; nullptr, or one that was cleaned up, ends the shadow. [non-rt]
   void resume(std::unique_ptr<CoreBase> core) noexcept;
   /// Sets a property of the candidate's shell, before the candidate executes next, to a value that checked() returned. [non-rt]
@@ -174,6 +215,9 @@ class Shadow {
 
   void connect_cells();
   void bind();
+  std::unique_lock<Mutex> lock_core(time_ns_t timeout_ns);
+  bool measure_steps() MAUVE_RT;
+  bool run_oldest() noexcept MAUVE_REQUIRES(run_mutex_);
   void execute(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
   void take_properties();
   void put_inputs();
@@ -191,6 +235,12 @@ class Shadow {
   const TaskSettings settings_;
   ShadowCapture capture_;
   std::shared_ptr<ShadowSignal> signal_{};
+  std::unique_ptr<Handover> handover_{};
+  std::unique_ptr<OutputSteps> steps_{};
+  static constexpr std::uint64_t kNeverNear = std::numeric_limits<std::uint64_t>::max();
+  Atomic<std::uint64_t> near_{kNeverNear};  // the last release, counted as ShadowCapture::captured()
+  RevocableReference<Task> awaiting_;
+  Atomic<bool> awaits_outputs_{false};
 
   Atomic<std::uint32_t> phase_{kPrepared};
   Atomic<time_ns_t> executing_since_ns_{0};

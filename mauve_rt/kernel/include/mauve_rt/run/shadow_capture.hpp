@@ -70,6 +70,12 @@ class ShadowCapture {
   void start() MAUVE_RT;
   /// A release has reached its next wait, of this index; whether a slot was filled. [rt]
   bool end_release(time_ns_t instant_ns, std::int64_t next_from) MAUVE_RT;
+  /// The last value that was read or written, by the port's place in the shell. [rt]
+  const std::byte* present(std::size_t port) const MAUVE_RT;
+  /// Whether it was read or written since the last release ended. [rt]
+  bool is_noted(std::size_t port) const MAUVE_RT { return present_.notes[port].is_noted; }
+  /// The release that ends is for no candidate. [rt]
+  void forget_release() MAUVE_RT;
 
   // ---- the shadow's thread
 

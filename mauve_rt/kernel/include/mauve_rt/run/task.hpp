@@ -454,6 +454,7 @@ class Task final : public Waiter {
   void fall_back(CommitAction& fallback) noexcept;
   void watch_probation() noexcept;
   void start_shadow() noexcept;
+  void leave_shadow() noexcept;
   void capture_release() noexcept;
   void take_up_revert() noexcept;
   void revert_in_park() noexcept;

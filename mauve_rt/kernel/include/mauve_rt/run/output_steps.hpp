@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// OutputSteps: how far the outputs of a candidate core are from those of the live core, and the step that they make at a swap.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/base/time.hpp"
+#include "mauve_rt/data/number_place.hpp"
+#include "mauve_rt/parts/shell.hpp"
+
+namespace mauve {
+
+/// The greatest difference of one output between the live core and the candidate that takes its place.
+struct GreatestStep {
+  std::string port{};
+  std::string field{};  // path of a number, such as linear.x
+  double step{0.0};     // >= 0, in the unit of the number
+};
+
+/// A core goes in only at an instant at which its outputs are near those of the live core.
+struct BumplessOptions {
+  std::vector<GreatestStep> outputs{};  // at least one
+  time_ns_t within_ns{s_to_ns(2)};      // so long such an instant is waited for; 1 to kLongest
+  time_ns_t budget_ns{0};               // of the candidate, as ShadowOptions::budget_ns; 0: the component's period
+};
+/// Throws Error (invalid_argument): a time or a step makes no sense, whatever the component's ports are. [non-rt]
+void check_options(const BumplessOptions& options, const std::string& component);
+
+/// One listed output, as far as it is known.
+struct OutputStep {
+  static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+  std::string output{};             // "command.torque"
+  double greatest{0.0};             // as it was asked for
+  double difference{kUnknown};      // candidate minus live core, in the last release that was compared
+  double least{kUnknown};           // the smallest difference so far, without its sign
+  time_ns_t least_instant_ns{0};    // when that was
+  double step{kUnknown};            // the new core's first output minus the old core's last one
+};
+
+/// | member         | written by                         | read by                   | order                               |
+/// | -------------- | ---------------------------------- | ------------------------- | ----------------------------------- |
+/// | numbers ... least_instant_ns | who executes the candidate | the same; who tells of it | Shadow::figures_mutex_         |
+/// | before         | the component's thread             | the same                  | -                                   |
+/// | step           | the component's thread             | anyone                    | relaxed: a lone number; NaN until then |
+class OutputSteps {
+ public:
+  /// Throws Error: unknown_port, invalid_argument (no write port, no number there, a port that writes zero at each change). [non-rt]
+  OutputSteps(const Shell& shell, const std::string& component, const std::vector<GreatestStep>& outputs);
+
+  /// What the live core and the candidate wrote to a port in one release, by its place in the shell; nullptr: nothing. [non-rt]
+  void note(std::size_t port, const void* live, const void* candidate);
+  /// Whether each output is within its greatest step, in this release. An output that one of both has never written is not. [non-rt]
+  bool compare(time_ns_t instant_ns);
+
+  /// Before the swap: `written(port)` gives the last value that the old core has written to it. [rt], the component's thread
+  template <typename Written>
+  void note_last(const Written& written) MAUVE_RT {
+    for (One& each : all_) {
+      each.before = each.place.of(written(each.port));
+      each.is_awaited = true;
+    }
+  }
+  /// After a release of the new core: `written(port)` gives what it has written to it, or nullptr. [rt], the component's thread
+  template <typename Written>
+  void note_first(const Written& written) MAUVE_RT {
+    for (One& each : all_) {
+      const void* const value = written(each.port);
+      if (value == nullptr || !each.is_awaited) continue;
+      each.is_awaited = false;
+      each.step.store(each.place.of(value) - each.before, std::memory_order_relaxed);
+    }
+  }
+  /// Whether all steps are known. [rt], the component's thread
+  bool are_known() const MAUVE_RT;
+
+  /// [non-rt]
+  std::vector<OutputStep> shown() const;
+
+ private:
+  struct One {
+    std::string output{};
+    std::size_t port{0};
+    NumberPlace place{};
+    double greatest{0.0};
+    double live{OutputStep::kUnknown};
+    double candidate{OutputStep::kUnknown};
+    double least{OutputStep::kUnknown};
+    time_ns_t least_instant_ns{0};
+    double before{OutputStep::kUnknown};
+    bool is_awaited{false};
+    Atomic<double> step{OutputStep::kUnknown};
+  };
+
+  std::vector<One> all_;
+};
+
+}  // namespace mauve
