@@ -311,7 +311,7 @@ std::shared_ptr<Shadow> TransactionCommit::Work::prepare_candidate(DraftComponen
   if (candidate == nullptr) {
     require_no_shadow(*draft_, changed);
     component.settle_shadow();
-    const time_ns_t period_ns = component.settled_period_ns(component.fsm());
+    const time_ns_t period_ns = component.task().grid().period_ns;
     const time_ns_t budget_ns = options.budget_ns != 0 ? options.budget_ns : std::max<time_ns_t>(period_ns, 1);
     candidate = std::make_shared<Shadow>(component,
                                          ShadowParts{.shell = make_shadow_shell(component),
