@@ -174,6 +174,7 @@ bool PartsChange::is_ready(bool is_last) noexcept {
     return false;
   }
   if (is_last && candidate_->is_near()) parts_.core = candidate_->hand_over();
+  if (parts_.core == nullptr) candidate_->catch_up(component_.parts_.core.get());
   return parts_.core != nullptr;
 }
 

@@ -197,6 +197,19 @@ bool Shadow::measure_steps() noexcept {
   return true;
 }
 
+void Shadow::catch_up(const CoreBase* live) noexcept {
+  const std::uint64_t missed = capture_.skipped() + skipped_budget_.load(std::memory_order_relaxed);
+  if (handover_ == nullptr || live == nullptr || !handover_->is_from(*live) || missed == missed_) return;
+  if (!MAUVE_RT_TRUSTED(run_mutex_.try_lock())) return;  // in another wait
+  if (phase_.load(std::memory_order_acquire) == kRunning && parts_.core != nullptr) {
+    capture_.begin_anew();
+    debt_ = 0;
+    handover_->copy();
+    missed_ = capture_.skipped() + skipped_budget_.load(std::memory_order_relaxed);
+  }
+  MAUVE_RT_TRUSTED(run_mutex_.unlock());
+}
+
 std::unique_ptr<CoreBase> Shadow::hand_over() noexcept {
   if (!MAUVE_RT_TRUSTED(run_mutex_.try_lock())) return nullptr;  // it waits for no thread
   std::unique_ptr<CoreBase> core;
@@ -307,7 +320,7 @@ ShadowRecord Shadow::record() const {
     record.reason = reason();
   }
   record.compared = figures_.compared;
-  record.skipped_budget = figures_.skipped_budget;
+  record.skipped_budget = static_cast<std::int64_t>(skipped_budget_.load(std::memory_order_relaxed));
   record.idle = figures_.idle;
   record.over_budget = figures_.over_budget;
   record.largest_execution_ns = figures_.largest_execution_ns;

@@ -102,6 +102,13 @@ void ShadowCapture::start() noexcept {
   forget_release();
 }
 
+void ShadowCapture::begin_anew() noexcept {
+  std::uint64_t dropped = 0;
+  for (; front() != nullptr; ++dropped) pop();
+  skipped_.store(skipped_.load(std::memory_order_relaxed) + dropped, std::memory_order_relaxed);
+  is_anew_ = true;
+}
+
 void ShadowCapture::forget_release() noexcept {
   for (PortNote& note : present_.notes) note.is_noted = false;
 }

@@ -68,8 +68,7 @@ void Shadow::execute(const ShadowCapture::Release& release) {
   is_anew_ = is_anew_ || release.is_anew;
   if (debt_ > 0) {
     --debt_;
-    const LockGuard lock(figures_mutex_);
-    ++figures_.skipped_budget;
+    skipped_budget_.fetch_add(1, std::memory_order_relaxed);
     return;
   }
   take_properties();

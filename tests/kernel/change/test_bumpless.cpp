@@ -151,6 +151,32 @@ TYPED_TEST(Bumpless, AnEqualCoreGoesInAtOnceWithTheStateOfTheOldOne) {
   EXPECT_EQ(1.0, this->record().steps.front().step) << "the count goes on";
 }
 
+TYPED_TEST(Bumpless, ACandidateThatMissedReleasesCatchesUp) {
+  this->deploy_live([](const CountingCore& core) { return core.count(); });
+  // Its first releases last longer than all slots hold, or than its budget: it misses some, and its count with them.
+  BumplessOptions options = this->within(0.5);
+  options.budget_ns = us_to_ns(10);
+  auto core = this->make_core(
+      "t/Next",
+      [](const CountingCore& next) {
+        if (next.runs < 2 && !TestFixture::is_virtual) {
+          const time_ns_t until_ns = monotonic_now_ns() + ms_to_ns(30);
+          while (monotonic_now_ns() < until_ns) {
+          }
+        }
+        return next.count();
+      },
+      &this->next);
+  Transaction change;
+  change.replace_core("c", std::move(core), ReplaceOptions{.bumpless = options});
+  this->host.commit(std::move(change));
+  this->host.until([&] { return this->next->count >= 20; }, "the new core");
+  EXPECT_EQ(1.0, this->record().steps.front().step);
+  if constexpr (!TestFixture::is_virtual) {
+    EXPECT_GT(this->record().skipped_late + this->record().skipped_budget, 0);
+  }
+}
+
 TYPED_TEST(Bumpless, ACoreThatDoesNotComeNearIsRefusedWithItsLeastDifference) {
   Component& component = this->deploy_live([](const CountingCore&) { return 1.0; });
   std::string text;
@@ -258,20 +284,22 @@ TYPED_TEST(Bumpless, OtherComponentsOfTheTransactionChangeAtTheSameInstant) {
 }
 
 TYPED_TEST(Bumpless, OnProbationTheOldCoreComesBack) {
+  const auto is_in = std::make_shared<std::atomic<bool>>(false);
   Component& component = this->deploy_live([](const CountingCore&) { return 1.0; });
   Transaction change;
   change.replace_core("c",
                       this->make_core(
                           "t/Next",
-                          [](const CountingCore& core) -> double {
-                            if (core.runs == 60) throw std::runtime_error("late fault");
-                            return core.runs == 20 ? 1.0 : 9.0;
+                          [is_in](const CountingCore& core) -> double {
+                            if (*is_in) throw std::runtime_error("late fault");
+                            return core.runs % 20 == 19 ? 1.0 : 9.0;
                           },
                           &this->next),
                       ReplaceOptions{.probation = ProbationOptions{.duration_ns = s_to_ns(100)},
                                      .bumpless = this->within(0.0)});
   this->host.commit(std::move(change));
   EXPECT_EQ("t/Next", component.core_implementation());
+  *is_in = true;
   this->host.until([&] { return component.core_implementation() == "t/Live"; }, "the old core");
   EXPECT_EQ(ComponentState::running, component.task().state());
 }

@@ -115,6 +115,8 @@ struct ShadowParts {
 /// | steps_            | who makes it wait for near outputs          | who executes, or tells; the component's thread | figures_mutex_; the commit publishes it |
 /// | near_             | who executes, who makes it wait             | the component's thread | release/acquire: the candidate's state after that release |
 /// | awaiting_         | who makes it wait                           | who executes           | its own: base/revocable_reference.hpp |
+/// | skipped_budget_   | who executes                                | anyone                 | relaxed: a lone number               |
+/// | missed_           | the component's thread                      | same                   | -                                    |
 /// | awaits_outputs_   | the component's thread, who closes it       | anyone                 | release/acquire: the steps           |
 /// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
@@ -156,6 +158,9 @@ class Shadow {
 
   /// Whether each listed output was near in the component's last release. [rt], the component's thread
   bool is_near() const MAUVE_RT { return near_.load(std::memory_order_acquire) == capture_.captured(); }
+  /// Where the candidate has missed releases it begins anew, with the state that this core has now: what it had goes. [rt] as begin(), the
+  /// component's thread, in this wait
+  void catch_up(const CoreBase* live) MAUVE_RT;
   /// The candidate's core, which executes no more here; nullptr: the shadow's thread looks at it this moment, or it has ended. [rt]
   std::unique_ptr<CoreBase> hand_over() MAUVE_RT;
   /// It was promoted: measures the first value of each listed output. Whether there is one to measure. [rt], the component's thread
@@ -207,7 +212,6 @@ class Shadow {
   class StillClock;
   struct Figures {
     std::int64_t compared{0};
-    std::int64_t skipped_budget{0};
     std::int64_t idle{0};
     std::int64_t over_budget{0};
     time_ns_t largest_execution_ns{0};
@@ -241,6 +245,8 @@ class Shadow {
   Atomic<std::uint64_t> near_{kNeverNear};  // the last release, counted as ShadowCapture::captured()
   RevocableReference<Task> awaiting_;
   Atomic<bool> awaits_outputs_{false};
+  Atomic<std::uint64_t> skipped_budget_{0};
+  std::uint64_t missed_{0};  // releases, as of the last time that it caught up
 
   Atomic<std::uint32_t> phase_{kPrepared};
   Atomic<time_ns_t> executing_since_ns_{0};

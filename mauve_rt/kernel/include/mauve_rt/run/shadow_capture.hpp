@@ -74,6 +74,9 @@ class ShadowCapture {
   const std::byte* present(std::size_t port) const MAUVE_RT;
   /// Whether it was read or written since the last release ended. [rt]
   bool is_noted(std::size_t port) const MAUVE_RT { return present_.notes[port].is_noted; }
+  /// What waits in the slots is skipped, and the next release is the first one of a candidate that begins anew. [rt], no other thread
+  /// empties slots meanwhile
+  void begin_anew() MAUVE_RT;
   /// The release that ends is for no candidate. [rt]
   void forget_release() MAUVE_RT;
 
