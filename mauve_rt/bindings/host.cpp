@@ -142,7 +142,8 @@ void bind_reports(py::module_& module) {
                     "T: the component executes with the change from this instant on.")
       .def_readonly("release_ns", &StepReport::release_ns, "Nominal instant of the release that followed.")
       .def_readonly("taken", &StepReport::taken, "State fields that the new core took over.")
-      .def_readonly("left", &StepReport::left, "State fields that it did not, with the reason.");
+      .def_readonly("left", &StepReport::left, "State fields that it did not, with the reason.")
+      .def_readonly("outputs", &StepReport::outputs, "Of a bumpless change, its outputs.");
   py::class_<RealtimeStatus>(module, "RealtimeStatus")
       .def_readonly("granted", &RealtimeStatus::granted)
       .def_readonly("missing", &RealtimeStatus::missing);

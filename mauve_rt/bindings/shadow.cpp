@@ -23,6 +23,33 @@ void bind_shadow(py::module_& module) {
       .def_readonly("numbers", &OutputDifference::numbers)
       .def_readonly("lag", &OutputDifference::lag,
                     "Releases by which the candidate's first number is later.");
+  py::class_<GreatestStep>(module, "GreatestStep", "The greatest step of an output at a bumpless change.")
+      .def(py::init([](const std::string& port, const std::string& field, double step) {
+             return GreatestStep{.port = port, .field = field, .step = step};
+           }),
+           py::arg("port"), py::arg("field"), py::kw_only(), py::arg("step"))
+      .def_readonly("port", &GreatestStep::port)
+      .def_readonly("field", &GreatestStep::field)
+      .def_readonly("step", &GreatestStep::step, ">= 0, in the unit of the number.");
+  py::class_<BumplessOptions>(module, "BumplessOptions",
+                              "A core goes in only where its outputs are near those of the core in force.")
+      .def(py::init([](const std::vector<GreatestStep>& outputs, time_ns_t within_ns, time_ns_t budget_ns) {
+             return BumplessOptions{.outputs = outputs, .within_ns = within_ns, .budget_ns = budget_ns};
+           }),
+           py::arg("outputs"), py::kw_only(), py::arg("within_ns") = BumplessOptions{}.within_ns,
+           py::arg("budget_ns") = 0,
+           "`budget_ns`: of the candidate for one release; 0: the component's period.")
+      .def_readonly("outputs", &BumplessOptions::outputs)
+      .def_readonly("within_ns", &BumplessOptions::within_ns, "So long such an instant is waited for.")
+      .def_readonly("budget_ns", &BumplessOptions::budget_ns);
+  py::class_<OutputStep>(module, "OutputStep",
+                         "One output of a bumpless change; fields as mauve_msgs/msg/OutputStep.")
+      .def_readonly("output", &OutputStep::output)
+      .def_readonly("greatest", &OutputStep::greatest)
+      .def_readonly("difference", &OutputStep::difference)
+      .def_readonly("least", &OutputStep::least)
+      .def_readonly("least_instant_ns", &OutputStep::least_instant_ns)
+      .def_readonly("step", &OutputStep::step, "NaN until it is known.");
   py::class_<ShadowRecord>(module, "ShadowRecord", "One shadow; fields as mauve_msgs/msg/Shadow.")
       .def_readonly("component", &ShadowRecord::component)
       .def_readonly("core", &ShadowRecord::core)
@@ -41,7 +68,8 @@ void bind_shadow(py::module_& module) {
       .def_readonly("over_budget", &ShadowRecord::over_budget)
       .def_readonly("budget_ns", &ShadowRecord::budget_ns)
       .def_readonly("largest_execution_ns", &ShadowRecord::largest_execution_ns)
-      .def_readonly("outputs", &ShadowRecord::outputs);
+      .def_readonly("outputs", &ShadowRecord::outputs)
+      .def_readonly("steps", &ShadowRecord::steps, "Of a bumpless change.");
 }
 
 }  // namespace mauve::bindings

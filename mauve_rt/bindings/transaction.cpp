@@ -51,30 +51,51 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
       .def(
           "replace_core",
           [](Self self, const std::string& component, const AnyCore& core,
-             const std::optional<ProbationOptions>& probation) -> Self {
+             const std::optional<ProbationOptions>& probation,
+             const std::optional<BumplessOptions>& bumpless) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {
-              if (is_name(core) && probation) {
-                steps.replace_core(component, core.cast<std::string>(), *probation);
+              const ReplaceOptions options{.probation = probation, .bumpless = bumpless};
+              const bool has_options = probation || bumpless;
+              if (is_name(core) && has_options) {
+                steps.replace_core(component, core.cast<std::string>(), options);
               } else if (is_name(core)) {
                 steps.replace_core(component, core.cast<std::string>());
-              } else if (probation) {
-                steps.replace_core(component, make_core(core, registry), *probation);
+              } else if (has_options) {
+                steps.replace_core(component, make_core(core, registry), options);
               } else {
                 steps.replace_core(component, make_core(core, registry));
               }
             });
           },
           py::arg("component"), py::arg("core"), py::arg("probation") = std::nullopt,
-          "With `probation`, an fsm that the same transaction replaces is on probation with the core.")
+          py::arg("bumpless") = std::nullopt,
+          R"(With `probation`, an fsm that the same transaction replaces is on probation with the core.
+
+With `bumpless`, the core of a running component goes in only where its outputs are near those of the old one.)")
       .def(
           "shadow",
-          [](Self self, const std::string& component, const std::string& core, time_ns_t budget_ns) -> Self {
+          [](Self self, const std::string& component, const std::string& core, time_ns_t budget_ns,
+             bool fresh) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry&) {
-              steps.shadow(component, core, {.budget_ns = budget_ns});
+              steps.shadow(component, core, {.budget_ns = budget_ns, .is_fresh = fresh});
             });
           },
-          py::arg("component"), py::arg("core"), py::arg("budget_ns"),
-          "A candidate executes in parallel with the core; its budget is for one release, on average.")
+          py::arg("component"), py::arg("core"), py::arg("budget_ns"), py::arg("fresh") = false,
+          R"(A candidate executes in parallel with the core; its budget is for one release, on average.
+
+It begins with copies of the core's state fields, unless it is `fresh`.)")
+      .def(
+          "promote",
+          [](Self self, const std::string& component, const std::optional<BumplessOptions>& bumpless,
+             bool fresh) -> Self {
+            return self.add([=](Transaction& steps, const PluginRegistry&) {
+              steps.promote(component, {.bumpless = bumpless, .is_fresh = fresh});
+            });
+          },
+          py::arg("component"), py::arg("bumpless") = std::nullopt, py::arg("fresh") = false,
+          R"(The candidate of the shadow becomes the core, with copies of the core's state fields.
+
+With `bumpless` it goes in where its outputs are near, with its own state. `fresh`: with its own state.)")
       .def(
           "replace_fsm",
           [](Self self, const std::string& component, const AnyFsm& fsm) -> Self {

@@ -1,10 +1,12 @@
 """`mauve shadow NODE [COMPONENT [CORE]]`: a candidate in parallel with the live core, and the difference."""
 
 import argparse
+import json
 import sys
 from typing import Any
 
 from mauve_rt.cli.arguments import add_executor
+from mauve_rt.cli.bumpless import add_bumpless, bumpless_text
 from mauve_rt.cli.completion import complete_components, complete_cores, completed_by
 from mauve_rt.cli.verb import BAD_USAGE, OK
 from mauve_rt.trace.reading.shadows import verdict_word
@@ -31,8 +33,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help=f"execution time of the candidate for one release, on average (default {_DEFAULT_BUDGET_US:g})",
     )
     action = parser.add_mutually_exclusive_group()
-    action.add_argument("--promote", action="store_true", help="make the candidate the core, with its state")
+    action.add_argument("--promote", action="store_true", help="make the candidate the core")
     action.add_argument("--end", action="store_true", help="end the shadow of the component")
+    parser.add_argument(
+        "--fresh",
+        action="store_true",
+        help="the candidate begins, or becomes the core, without copies of the core's state fields",
+    )
+    add_bumpless(parser)
     parser.add_argument("--json", action="store_true", help="print JSON")
 
 
@@ -40,6 +48,9 @@ def main(args: argparse.Namespace) -> int:
     """Begin, show, promote or end a shadow."""
     if (args.promote or args.end) and (not args.component or args.core):
         print("mauve: --promote and --end need a component, and no core", file=sys.stderr)
+        return BAD_USAGE
+    if args.bumpless and not args.promote:
+        print("mauve: --bumpless needs --promote", file=sys.stderr)
         return BAD_USAGE
     kind = "promote" if args.promote else "end_shadow" if args.end else "shadow" if args.core else ""
     return _change(args, kind) if kind else _show(args)
@@ -51,8 +62,13 @@ def _change(args: argparse.Namespace, kind: str) -> int:
     from mauve_rt.cli.client import connected  # noqa: PLC0415
     from mauve_rt.cli.views import print_reply  # noqa: PLC0415
 
-    value = f"{{budget_us: {args.budget_us!r}}}" if kind == "shadow" else ""
-    step = ReconfigurationStep(kind=kind, target=args.component, name=args.core, value=value)
+    value = {"fresh": True} if args.fresh and kind != "end_shadow" else {}
+    if kind == "shadow":
+        value["budget_us"] = args.budget_us
+    if args.bumpless:
+        value["bumpless"] = json.loads(bumpless_text(args))
+    text = json.dumps(value) if value else ""
+    step = ReconfigurationStep(kind=kind, target=args.component, name=args.core, value=text)
     request = Reconfigure.Request(steps=[step], requested_by="mauve")
     with connected(first=True) as client:
         reply = client.call(Reconfigure, f"{args.executor}/reconfigure", request)
@@ -86,7 +102,7 @@ def _print(shadow: Any) -> None:
     from rich import box  # noqa: PLC0415 - takes its time to load
     from rich.table import Table  # noqa: PLC0415
 
-    from mauve_rt.cli.views import console  # noqa: PLC0415
+    from mauve_rt.cli.views import console, output_step_words  # noqa: PLC0415
     from mauve_rt.counts import counted, duration  # noqa: PLC0415
 
     out = console()
@@ -109,6 +125,8 @@ def _print(shadow: Any) -> None:
         soft_wrap=True,
     )
     out.print(f"  {', '.join([*facts, time])}", soft_wrap=True)
+    for step in shadow.steps:
+        out.print(f"  {output_step_words(step)}", soft_wrap=True)
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
     for column in ("output", "compared", "largest difference", "rms", "NaN", "lag"):
         table.add_column(column, no_wrap=True)

@@ -30,6 +30,7 @@ from mauve_rt.cli import (
     watch_verb,
 )
 from mauve_rt.cli.arguments import add_executor_and_json
+from mauve_rt.cli.bumpless import add_bumpless, bumpless_text
 from mauve_rt.cli.completion import (
     complete_components,
     complete_cores,
@@ -175,6 +176,7 @@ def _add_replace_core(parser: argparse.ArgumentParser) -> None:
     _add_force(parser)
     _add_phase_timeout(parser)
     _add_probation(parser)
+    add_bumpless(parser)
     _add_over_and_base(parser)
     completed_by(parser.add_argument("core", help="the new core, package/Class"), complete_cores)
 
@@ -272,6 +274,7 @@ def _replace_core(args: argparse.Namespace) -> int:
         core=args.core,
         commit_timeout_s=args.timeout,
         force=args.force,
+        bumpless=bumpless_text(args),
         **_probation_of(args),
         **_over_of(args),
     )

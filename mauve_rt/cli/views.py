@@ -2,6 +2,7 @@
 
 import array
 import json
+import math
 import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,8 @@ def as_plain(message: Any) -> Any:
     """A ROS message as values that JSON has."""
     if hasattr(message, "get_fields_and_field_types"):
         return {name: as_plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
+    if isinstance(message, float) and not math.isfinite(message):
+        return None  # JSON has no word for it
     if isinstance(message, bytes):
         return list(message)
     if isinstance(message, array.array) or hasattr(message, "tolist"):
@@ -92,6 +95,7 @@ def report_lines(report: Sequence[Any]) -> list[str]:
             facts.append(f"took over {', '.join(step.taken)}")
         if step.phase_actual_ns != none:
             facts.append(_next_release(step))
+        facts += [output_step_words(output) for output in step.outputs]
         if step.left:
             facts.append(f"not taken over: {'; '.join(step.left)}")
         if len(report) > 1:
@@ -100,6 +104,14 @@ def report_lines(report: Sequence[Any]) -> list[str]:
         elif facts:
             lines.append(f"{step.step}: {', '.join(facts)}")
     return lines
+
+
+def output_step_words(output: Any) -> str:
+    """How far an output went at a bumpless change."""
+    if math.isnan(output.step):
+        return f"{output.output} {output.difference:+.4g} before the change, its step is not known yet"
+    bound = f"difference {output.difference:+.4g}, at most {output.greatest:g}"
+    return f"{output.output} stepped by {output.step:+.4g} ({bound})"
 
 
 def _next_release(step: Any) -> str:

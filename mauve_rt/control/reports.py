@@ -78,7 +78,7 @@ def reports_of(steps: tuple[Step, ...], measured: TransactionReport) -> tuple[Re
 def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: bool) -> Report:
     kind = STEP_KINDS[step.kind]
     words = [step.kind, step.target if kind.is_about_resource else step.name]
-    if kind.value != "section" and step.kind != "replace_core":
+    if kind.value not in ("section", "replacement", "promotion"):
         words.append(step.value)
     held = measured.blackout_ns != 0
     follows = held and not is_complete and measured.phase_actual_ns == NOT_MEASURED
@@ -97,4 +97,5 @@ def _report(step: Step, measured: StepReport, *, prepare_ns: int, is_complete: b
         release_ns=measured.release_ns,
         taken=tuple(measured.taken),
         left=tuple(measured.left),
+        outputs=tuple(measured.outputs),
     )

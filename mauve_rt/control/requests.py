@@ -5,13 +5,16 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal, Protocol
 
 from mauve_msgs.msg import ReplyCode
 from mauve_rt._kernel import ERROR_REPLIES, NOT_MEASURED
 from mauve_rt.errors import error_code
 from mauve_rt.file_schema.words import cut
 from mauve_rt.model.steps import SHOWN_STEP, Step
+
+if TYPE_CHECKING:
+    from mauve_rt._kernel import OutputStep
 
 __all__ = [
     "NOT_MEASURED",
@@ -189,6 +192,7 @@ class Report:
     release_ns: int = NOT_MEASURED
     taken: tuple[str, ...] = ()
     left: tuple[str, ...] = ()
+    outputs: tuple["OutputStep", ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

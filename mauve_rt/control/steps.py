@@ -36,6 +36,7 @@ from mauve_rt.model.checks import Checks, property_mismatch
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
+from mauve_rt.model.bumpless import read_bumpless
 from mauve_rt.model.probation import read_probation
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
@@ -126,6 +127,8 @@ class Plan:
 
     def _change_component(self, step: Step, kind: StepKind) -> None:
         component, name = self._component(step), step.target
+        if kind.value == "promotion" and isinstance(self.transaction, Transaction):
+            return self._promote(step)
         self.transaction.add(step.kind, name, step.name, _kernel_value(step, kind, component))
         if kind.removes:
             del self._sketches[name]
@@ -166,9 +169,10 @@ class Plan:
                 raise _undeclared(step, kind, allowed, loader)
             loader.require(kind, step.name)
         if step.kind == "shadow":
-            self.transaction.shadow(step.target, step.name, _budget_ns(step))
+            budget_ns, is_fresh = _shadow_options(step)
+            self.transaction.shadow(step.target, step.name, budget_ns, fresh=is_fresh)
         elif step.value and kind == "core":
-            self._replace_on_probation(step, sketch)
+            self._replace_with_options(step, sketch)
         else:
             self.transaction.add(step.kind, step.target, step.name)
         if kind == "shell":
@@ -176,21 +180,43 @@ class Plan:
             _check_structs(shell)
             sketch.properties = {item.name: item for item in shell.properties}
 
-    def _replace_on_probation(self, step: Step, sketch: _Sketch) -> None:
+    def _replace_with_options(self, step: Step, sketch: _Sketch) -> None:
         subject = f"step {step.kind} of '{step.target}'"
+        value = _yaml(step, subject)
         try:
-            probation = read_probation(_yaml(step, subject))
+            trial = dict(value) if isinstance(value, dict) else value
+            given = trial.pop("bumpless", None) if isinstance(trial, dict) else None
+            bumpless = read_bumpless(given) if given is not None else None
+            probation = read_probation(trial) if trial or bumpless is None else None
         except ValueError as error:
             raise RefusalError(Code.INVALID, f"{subject}: {error}") from None
         if not isinstance(self.transaction, Transaction):
-            text = f"{subject}: a rule of the executor cannot put a core on probation"
+            what = "put a core on probation" if probation is not None else "make a bumpless change"
+            text = f"{subject}: a rule of the executor cannot {what}"
             raise RefusalError(Code.UNSUPPORTED, f"{text}; give the rule `in: supervisor`")
-        shell = next(
-            (part.shell for part in self._runtime.components() if part.name == step.target),
-            sketch.model.shell,
+        self.transaction.replace_core(
+            step.target,
+            step.name,
+            None if probation is None else probation.options(self._ports(step.target, sketch)),
+            None if bumpless is None else bumpless.options(),
         )
-        ports = self._runtime.registry.describe_shell(shell).ports
-        self.transaction.replace_core(step.target, step.name, probation.options(ports))
+
+    def _ports(self, component: str, sketch: _Sketch) -> Collection[PortDescription]:
+        parts = self._runtime.components()
+        shell = next((part.shell for part in parts if part.name == component), sketch.model.shell)
+        return self._runtime.registry.describe_shell(shell).ports
+
+    def _promote(self, step: Step) -> None:
+        subject = f"step {step.kind} of '{step.target}'"
+        value = _yaml(step, subject) if step.value else {}
+        if not isinstance(value, dict) or not set(value) <= {"bumpless", "fresh"}:
+            expected = "expected {bumpless: {outputs: ..., within_s: S}, fresh: true} or nothing"
+            raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
+        try:
+            bumpless = read_bumpless(value["bumpless"]).options() if "bumpless" in value else None
+        except ValueError as error:
+            raise RefusalError(Code.INVALID, f"{subject}: {error}") from None
+        self.transaction.promote(step.target, bumpless, fresh=_is_fresh(value, subject))
 
     def _add_component(self, step: Step) -> None:
         name = step.target
@@ -290,15 +316,24 @@ def _yaml(step: Step, subject: str) -> object:
         raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
 
 
-def _budget_ns(step: Step) -> int:
-    """The value of a step shadow: {budget_us: 100}."""
+def _shadow_options(step: Step) -> tuple[int, bool]:
+    """The value of a step shadow: budget in ns, and whether the candidate is fresh."""
     subject = f"step {step.kind} of '{step.target}'"
     value = _yaml(step, subject)
-    budget = value.get("budget_us") if isinstance(value, dict) and set(value) == {"budget_us"} else None
+    is_known = isinstance(value, dict) and set(value) <= {"budget_us", "fresh"}
+    budget = value.get("budget_us") if isinstance(value, dict) and is_known else None
     if isinstance(budget, bool) or not isinstance(budget, int | float) or not 0 < budget <= _MAX_BUDGET_US:
         expected = f"expected {{budget_us: N}}, more than 0 to {_MAX_BUDGET_US:,} us"
         raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
-    return round(budget * 1000)
+    assert isinstance(value, dict)  # noqa: S101 - it has a budget
+    return round(budget * 1000), _is_fresh(value, subject)
+
+
+def _is_fresh(value: Mapping[str, object], subject: str) -> bool:
+    found = value.get("fresh", False)
+    if isinstance(found, bool):
+        return found
+    raise RefusalError(Code.INVALID, f"{subject}: fresh: expected true or false, found {shown(str(found))}")
 
 
 def _kernel_value(step: Step, kind: StepKind, component: _Sketch | None = None) -> PropertyValue | None:

@@ -24,11 +24,13 @@ from mauve_msgs.msg import (
     TraceArchitecture,
 )
 from mauve_msgs.msg import HeldElement as HeldElementMessage
+from mauve_msgs.msg import OutputStep as OutputStepMessage
 from mauve_rt._kernel import (
     ActionStep,
     ComponentDescription,
     DescribedState,
     HeldElement,
+    OutputStep,
     PortDescription,
     ProbationRecord,
     ShadowRecord,
@@ -321,13 +323,35 @@ def shadow_message(record: ShadowRecord) -> Any:
             for output in record.outputs
             for number in output.numbers
         ],
+        steps=[output_step(step) for step in record.steps],
+    )
+
+
+def output_step(step: OutputStep) -> Any:
+    """OutputStep of one output of a bumpless change."""
+    return OutputStepMessage(
+        output=step.output,
+        greatest=step.greatest,
+        difference=step.difference,
+        least=step.least,
+        least_instant_ns=step.least_instant_ns,
+        step=step.step,
     )
 
 
 def step_reports(outcome: Outcome) -> list[Any]:
     """StepReport of every step."""
-    lists = [(report, {"taken": list(report.taken), "left": list(report.left)}) for report in outcome.report]
-    return [StepReport(**{**vars(report), **of_state}) for report, of_state in lists]
+    return [
+        StepReport(
+            **{
+                **vars(report),
+                "taken": list(report.taken),
+                "left": list(report.left),
+                "outputs": [output_step(step) for step in report.outputs],
+            }
+        )
+        for report in outcome.report
+    ]
 
 
 def timing_verdicts(outcome: Outcome) -> list[Any]:

@@ -10,7 +10,7 @@ from typing import Literal
 
 Target = Literal["component", "new component", "resource", "new resource", "all"]
 Name = Literal["", "core", "fsm", "shell", "property", "port"]
-Value = Literal["", "scalar", "resource.service", "section", "probation", "shadow"]
+Value = Literal["", "scalar", "resource.service", "section", "replacement", "shadow", "promotion"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -52,10 +52,11 @@ class StepKind:
 
 STEP_KINDS: Mapping[str, StepKind] = {
     "replace_core": StepKind(
-        what="replace the core; the component keeps its pending instant. With a value (probation_s, "
-        "revert_on, releases) the core is on probation: a violation puts the old core back",
+        what="replace the core; the component keeps its pending instant. With probation_s, revert_on and "
+        "releases in the value the core is on probation: a violation puts the old core back. With bumpless "
+        "it goes in only where its outputs are near those of the old core",
         name="core",
-        value="probation",
+        value="replacement",
         needs_running=True,
     ),
     "revert_core": StepKind(
@@ -70,7 +71,9 @@ STEP_KINDS: Mapping[str, StepKind] = {
     ),
     "end_shadow": StepKind(what="end the shadow of the component", is_prepared=False, protects=True),
     "promote": StepKind(
-        what="replace the core by the candidate of the shadow, which keeps its state", is_prepared=False
+        what="replace the core by the candidate of the shadow; value: bumpless, fresh, or none",
+        value="promotion",
+        is_prepared=False,
     ),
     "replace_fsm": StepKind(what="replace the fsm", name="fsm", needs_running=True),
     "replace_shell": StepKind(

@@ -378,7 +378,7 @@ def _start(ros: Any) -> Request:
 
 
 def _replace_core(ros: Any) -> Request:
-    step = Step("replace_core", ros.component, ros.core, _probation_value(ros))
+    step = Step("replace_core", ros.component, ros.core, _replacement_value(ros))
     return Request(steps=(step,), over=ros.over, base=ros.base, **_commit(ros), **_common(ros))
 
 
@@ -401,7 +401,7 @@ def _reconfigure(ros: Any) -> Request:
 
 
 def _reload(ros: Any) -> Request:
-    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back, probation=_probation_value(ros))
+    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back, probation=_replacement_value(ros))
     return Request(reload=order, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
 
 
@@ -430,12 +430,16 @@ def _write_snapshot(ros: Any) -> Request:
     return Request(recording=RecordingOrder(kind="snapshot", bag=ros.bag), **_common(ros))
 
 
-def _probation_value(ros: Any) -> str:
-    """The value of a step that puts a core on probation; empty: none was asked for."""
-    if ros.probation_s == 0.0 and not ros.revert_on:
-        return ""
-    listed = ", ".join(ros.revert_on)
-    return f"{{probation_s: {ros.probation_s!r}, revert_on: [{listed}], releases: {ros.probation_releases}}}"
+def _replacement_value(ros: Any) -> str:
+    """The value of a step replace_core; empty: at once, and without probation."""
+    keys = []
+    if ros.probation_s != 0.0 or ros.revert_on:
+        keys.append(f"probation_s: {ros.probation_s!r}")
+        keys.append(f"revert_on: [{', '.join(ros.revert_on)}]")
+        keys.append(f"releases: {ros.probation_releases}")
+    if ros.bumpless:
+        keys.append(f"bumpless: {ros.bumpless}")
+    return f"{{{', '.join(keys)}}}" if keys else ""
 
 
 def _commit(ros: Any) -> dict[str, Any]:

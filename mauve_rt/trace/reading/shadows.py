@@ -57,6 +57,33 @@ class ShadowOutput:
 
 
 @dataclass(frozen=True)
+class OutputStep:
+    """One output of a bumpless change. Numbers in the unit of the output; NaN where they are not known."""
+
+    output: str
+    """Port and number, e.g. `command.torque`."""
+    greatest: float
+    """Greatest difference at which the candidate goes in."""
+    difference: float
+    """Candidate minus core, in the last release that was compared."""
+    least: float
+    """Smallest absolute difference."""
+    least_instant_ns: int
+    step: float
+    """First output of the new core minus last output of the old core."""
+
+    @classmethod
+    def of_message(cls, message: Any) -> Self:
+        """Take it from a mauve_msgs/msg/OutputStep, of whichever library."""
+        numbers = ("greatest", "difference", "least", "step")
+        return cls(
+            output=message.output,
+            least_instant_ns=int(message.least_instant_ns),
+            **{name: float(getattr(message, name)) for name in numbers},
+        )
+
+
+@dataclass(frozen=True)
 class Shadow:
     """A shadow as one message of the bag reports it. Times in ns of CLOCK_MONOTONIC, or of virtual time."""
 
@@ -91,6 +118,8 @@ class Shadow:
     largest_execution_ns: int
     """Largest execution time of one release."""
     outputs: tuple[ShadowOutput, ...]
+    steps: tuple[OutputStep, ...] = ()
+    """Of a bumpless change: the outputs that it bounds."""
 
     @classmethod
     def of_message(cls, message: Any, time_ns: int) -> Self:
@@ -108,6 +137,8 @@ class Shadow:
             reason=message.reason,
             end_ns=int(message.end_ns) or None,
             outputs=tuple(ShadowOutput.of_message(output) for output in message.outputs),
+            # bags of earlier versions have none
+            steps=tuple(OutputStep.of_message(step) for step in getattr(message, "steps", ())),
             **{name: int(getattr(message, name)) for name in counts},
         )
 

@@ -1,6 +1,8 @@
 """Shadows in a report: candidates with their verdicts, and how their outputs differed."""
 
-from mauve_rt.trace.reading.shadows import Shadow, ShadowOutput
+import math
+
+from mauve_rt.trace.reading.shadows import OutputStep, Shadow, ShadowOutput
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import Cell, Section, table
 from mauve_rt.trace.report.units import number_text, time_text
@@ -8,6 +10,8 @@ from mauve_rt.trace.report.units import number_text, time_text
 _MANY_ROWS = 400
 _SHADOWS = ("begin", "component", "candidate", "live core", "verdict", "reason", "releases", "compared")
 _OUTPUTS = ("component", "candidate", "output", "compared", "largest difference", "rms", "NaN", "lag")
+
+_STEPS = ("component", "candidate", "verdict", "output", "greatest", "difference", "least difference", "step")
 
 
 def shadows_section(analysis: Analysis) -> Section | None:
@@ -19,6 +23,9 @@ def shadows_section(analysis: Analysis) -> Section | None:
     html = table((*columns, "budget"), [_row(one, analysis.zero_ns) for one in found])
     html += "<h3>Differences of the outputs</h3>"
     html += table(_OUTPUTS, [_output_row(one, output) for one in found for output in one.outputs])
+    steps = [_step_row(one, step) for one in found for step in one.steps]
+    if steps:
+        html += f"<h3>Outputs of bumpless changes</h3>{table(_STEPS, steps)}"
     more = len(analysis.trace.shadows) - len(found)
     return Section(
         "Shadows",
@@ -26,6 +33,7 @@ def shadows_section(analysis: Analysis) -> Section | None:
         note="Candidate cores that executed in parallel with the live core, on the same inputs. "
         "Skipped: late, as the shadow's thread was late; budget, to stay within the budget. "
         "Lag: releases by which the candidate's first number of the port is later. "
+        "Step: the new core's first output minus the old core's last one. "
         "Verdict running: the shadow ran when the recording ended.",
         anchor="shadows",
     )
@@ -41,6 +49,17 @@ def _row(one: Shadow, zero_ns: int) -> tuple[object, ...]:
         Cell(time_text(one.largest_execution_ns)),
         Cell(time_text(one.budget_ns)),
     )
+
+
+def _step_row(one: Shadow, step: OutputStep) -> tuple[object, ...]:
+    return (
+        *(one.component, one.core, one.verdict, step.output),
+        *(Cell(_known(number)) for number in (step.greatest, step.difference, step.least, step.step)),
+    )
+
+
+def _known(number: float) -> str:
+    return "" if math.isnan(number) else number_text(number)
 
 
 def _output_row(one: Shadow, output: ShadowOutput) -> tuple[object, ...]:

@@ -59,7 +59,7 @@ class Bumpless : public OnBothHosts<Way> {
     *log = core->log;
     return core;
   }
-  static BumplessOptions within(double step, time_ns_t within_ns = s_to_ns(20)) {
+  static BumplessOptions within(double step, time_ns_t within_ns = s_to_ns(100)) {
     return {.outputs = {{.port = "output", .field = "value", .step = step}}, .within_ns = within_ns};
   }
   Transaction replacement(const Law& law, const BumplessOptions& options) {
@@ -249,7 +249,7 @@ TYPED_TEST(Bumpless, TheCandidateOfAShadowIsPromotedWithItsState) {
   far.promote("c", {.bumpless = this->within(0.0, 1)});
   EXPECT_EQ(ErrorCode::timeout, this->code_of([&] { this->host.commit(std::move(far)); }));
   EXPECT_EQ(Verdict::running, this->record().verdict) << "it goes on in its shadow";
-  promote(0.0, s_to_ns(20));
+  promote(0.0, s_to_ns(100));
   EXPECT_EQ("t/Next", component.core_implementation());
   this->host.until([&] { return this->next->count >= 40; }, "the new core");
   this->host.stop("c");
@@ -337,6 +337,22 @@ TYPED_TEST(Bumpless, WhatCannotBeBoundedIsRefusedBeforeAnythingIsBuilt) {
   EXPECT_TRUE((*this->host).shadows().empty());
 }
 
+struct ZeroShell : TestShell {
+  WritePort<Number>& zeroed = write_port<Number>("zeroed", {.on_commit = OutputPolicy::set_zero}).optional();
+};
+
+TYPED_TEST(Bumpless, APortThatWritesZeroAtEachChangeIsRefused) {
+  this->architecture.template add_component<ZeroShell, TestCore, TestFsm>("z");
+  this->deploy();
+  Transaction change;
+  change.replace_core("z", std::make_unique<TestCore>(),
+                      ReplaceOptions{.bumpless = BumplessOptions{
+                                         .outputs = {{.port = "zeroed", .field = "value", .step = 1.0}}}});
+  std::string text;
+  EXPECT_EQ(ErrorCode::invalid_argument, this->code_of([&] { this->host.commit(std::move(change)); }, &text));
+  EXPECT_THAT(text, HasSubstr("on_commit: set_zero"));
+}
+
 TYPED_TEST(Bumpless, ADryRunBeginsNothing) {
   Component& component = this->deploy_live([](const CountingCore&) { return 1.0; });
   Transaction rehearsed = this->replacement([](const CountingCore&) { return 9.0; }, this->within(0.1));
@@ -364,6 +380,72 @@ TYPED_TEST(Bumpless, APromotedCoreGoesOnWithTheStateOfTheOldOne) {
                                   [&](const auto& each) { return each.first >= instant_ns; });
   EXPECT_EQ(this->live->written.back().second + 1.0, first->second) << "the count goes on";
   EXPECT_GT(this->next->written.front().second, 3.0) << "the candidate began with the state of the live core";
+}
+
+/// A controller of one joint: its terms are torques, so that another one with other gains can go on with them.
+struct ArmCore : TestCore {
+  MAUVE_STATE(integral_nm, error_before)
+
+ public:
+  double kp{20.0}, ki{60.0}, kd{1.0};
+  double integral_nm{0.0}, error_before{0.0};
+
+  void act() override {
+    const double t = 1e-9 * static_cast<double>(clock_ns());
+    const double error = 0.5 * std::sin(2.0 * t) - exposed_shell().input.read().value.value;
+    integral_nm += ki * error * 1e-3;
+    const double torque = kp * error + integral_nm + kd * (error - error_before) * 1e3;
+    error_before = error;
+    exposed_shell().output.write({torque});
+    TestCore::act();
+  }
+};
+
+/// The joint itself, with gravity.
+struct JointCore : TestCore {
+  double angle{0.0}, speed{0.0};
+
+  void act() override {
+    const double torque = exposed_shell().input.read().value.value;
+    speed += 1e-3 * (torque - 5.0 * std::sin(angle) - 0.5 * speed) / 0.2;
+    angle += 1e-3 * speed;
+    exposed_shell().output.write({angle});
+    TestCore::act();
+  }
+};
+
+TYPED_TEST(Bumpless, NoTorqueOfAnArmStepsFartherThanAskedFor) {
+  // In virtual time as many as a tester would want to see; on threads each of them takes some milliseconds.
+  constexpr int kSwaps = TestFixture::is_virtual ? 1'000 : 60;
+  constexpr double kGreatest = 0.4;
+  this->architecture.template add_resource<SharedData<Number>>("torque");
+  this->architecture.template add_resource<SharedData<Number>>("angle");
+  this->add("c").replace_core(std::make_unique<ArmCore>());
+  this->add("joint").replace_core(std::make_unique<JointCore>());
+  this->architecture.connect("c", "output", "torque", "write");
+  this->architecture.connect("joint", "input", "torque", "read");
+  this->architecture.connect("joint", "output", "angle", "write");
+  this->architecture.connect("c", "input", "angle", "read");
+  this->deploy();
+  double farthest = 0.0;
+  for (int swap = 0; swap < kSwaps; ++swap) {
+    auto core = std::make_unique<ArmCore>();
+    const bool is_firm = swap % 2 == 0;
+    core->kp = is_firm ? 45.0 : 20.0;
+    core->ki = is_firm ? 200.0 : 60.0;
+    core->kd = is_firm ? 1.5 : 1.0;
+    Transaction change;
+    change.replace_core("c", std::move(core), ReplaceOptions{.bumpless = this->within(kGreatest)});
+    ASSERT_NO_THROW(this->host.commit(std::move(change))) << "swap " << swap;
+    this->host.until([&] { return !std::isnan(this->record().steps.front().step); }, "the first torque");
+    const OutputStep step = this->record().steps.front();
+    ASSERT_LE(std::abs(step.difference), kGreatest) << "swap " << swap;
+    farthest = std::max(farthest, std::abs(step.step));
+    this->host.run_for(ms_to_ns(7));
+  }
+  // What a torque moves in one period besides: the arm follows a curve.
+  if constexpr (TestFixture::is_virtual) EXPECT_LE(farthest, kGreatest + 0.1);
+  RecordProperty("farthest_nm", std::to_string(farthest));
 }
 
 TEST(BumplessStop, AStopDoesNotWaitForNearOutputs) {
