@@ -28,6 +28,7 @@ Attributes:
   bind_python_fsm(module);
   bind_registry(module);
   bind_settings(module);
+  bind_output_steps(module);
   bind_reports(module);
   bind_probation(module);
   bind_shadow(module);

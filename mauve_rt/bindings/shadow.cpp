@@ -4,25 +4,7 @@
 
 namespace mauve::bindings {
 
-void bind_shadow(py::module_& module) {
-  py::class_<NumberDifference>(module, "NumberDifference")
-      .def_readonly("path", &NumberDifference::path)
-      .def_readonly("count", &NumberDifference::count)
-      .def_readonly("maximum", &NumberDifference::maximum)
-      .def_readonly("rms", &NumberDifference::rms)
-      .def_readonly("nan", &NumberDifference::nan)
-      .def_readonly("live_nan", &NumberDifference::live_nan);
-  py::class_<OutputDifference>(module, "OutputDifference")
-      .def_readonly("port", &OutputDifference::port)
-      .def_readonly("type", &OutputDifference::type)
-      .def_readonly("both", &OutputDifference::both)
-      .def_readonly("live_only", &OutputDifference::live_only)
-      .def_readonly("shadow_only", &OutputDifference::shadow_only)
-      .def_readonly("is_truncated", &OutputDifference::is_truncated,
-                    "The value has more numbers than are compared.")
-      .def_readonly("numbers", &OutputDifference::numbers)
-      .def_readonly("lag", &OutputDifference::lag,
-                    "Releases by which the candidate's first number is later.");
+void bind_output_steps(py::module_& module) {
   py::class_<GreatestStep>(module, "GreatestStep", "The greatest step of an output at a bumpless change.")
       .def(py::init([](const std::string& port, const std::string& field, double step) {
              return GreatestStep{.port = port, .field = field, .step = step};
@@ -50,6 +32,27 @@ void bind_shadow(py::module_& module) {
       .def_readonly("least", &OutputStep::least)
       .def_readonly("least_instant_ns", &OutputStep::least_instant_ns)
       .def_readonly("step", &OutputStep::step, "NaN until it is known.");
+}
+
+void bind_shadow(py::module_& module) {
+  py::class_<NumberDifference>(module, "NumberDifference")
+      .def_readonly("path", &NumberDifference::path)
+      .def_readonly("count", &NumberDifference::count)
+      .def_readonly("maximum", &NumberDifference::maximum)
+      .def_readonly("rms", &NumberDifference::rms)
+      .def_readonly("nan", &NumberDifference::nan)
+      .def_readonly("live_nan", &NumberDifference::live_nan);
+  py::class_<OutputDifference>(module, "OutputDifference")
+      .def_readonly("port", &OutputDifference::port)
+      .def_readonly("type", &OutputDifference::type)
+      .def_readonly("both", &OutputDifference::both)
+      .def_readonly("live_only", &OutputDifference::live_only)
+      .def_readonly("shadow_only", &OutputDifference::shadow_only)
+      .def_readonly("is_truncated", &OutputDifference::is_truncated,
+                    "The value has more numbers than are compared.")
+      .def_readonly("numbers", &OutputDifference::numbers)
+      .def_readonly("lag", &OutputDifference::lag,
+                    "Releases by which the candidate's first number is later.");
   py::class_<ShadowRecord>(module, "ShadowRecord", "One shadow; fields as mauve_msgs/msg/Shadow.")
       .def_readonly("component", &ShadowRecord::component)
       .def_readonly("core", &ShadowRecord::core)

@@ -42,6 +42,7 @@ void bind_transforms(py::module_& module);
 /// Registers Transaction and its reports.
 void bind_transaction(py::module_& module);
 void bind_probation(py::module_& module);
+void bind_output_steps(py::module_& module);
 void bind_shadow(py::module_& module);
 void bind_open_change(py::module_& module);
 /// Registers what parts written in Python see of their shell, and what they declare themselves with.

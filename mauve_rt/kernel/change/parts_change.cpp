@@ -68,13 +68,13 @@ PartsChange::PartsChange(Component& component, Parts fresh)
   }
 }
 
-PartsChange::PartsChange(Component& component, std::shared_ptr<Shadow> candidate)
+PartsChange::PartsChange(Component& component, std::shared_ptr<Shadow> candidate, bool is_fresh)
     : component_(component),
       new_shell_(nullptr),
       fsm_before_(&component.fsm()),
       restarts_(false),
       candidate_(std::move(candidate)),
-      afresh_(true),
+      afresh_(is_fresh),
       promotes_(true),
       trace_id_(TraceNames::intern("replace_core " + candidate_->core_name())) {
   task = &component.task();
@@ -158,6 +158,7 @@ void PartsChange::prepare_candidate() {
   what_ = "core " + candidate_->core_name();
   candidate_->with_core(Shadow::kStateEnd, [this](CoreBase& core) {
     binding_ = component_.require_binding(core, component_.fsm());
+    if (!afresh_) handover_ = std::make_unique<Handover>(component_.core(), core);
   });
 }
 
@@ -174,7 +175,6 @@ bool PartsChange::is_ready(bool is_last) noexcept {
     return false;
   }
   if (is_last && candidate_->is_near()) parts_.core = candidate_->hand_over();
-  if (parts_.core == nullptr) candidate_->catch_up(component_.parts_.core.get());
   return parts_.core != nullptr;
 }
 

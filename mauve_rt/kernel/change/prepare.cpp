@@ -264,7 +264,7 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   DraftComponent& draft = *change.draft;
   Component& component = *draft.component;
   if (draft.awaits_near()) {
-    change.parts = std::make_unique<PartsChange>(component, prepare_candidate(draft));
+    change.parts = std::make_unique<PartsChange>(component, prepare_candidate(draft), draft.is_fresh);
   } else {
     if (draft.promoted != nullptr) {
       draft.fresh.core = draft.promoted->suspend(Shadow::kStateEnd);
@@ -293,7 +293,6 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   begin_preview(preview, change.parts->shell(), draft);
   change.parts->prepare();
   note_fields(draft.core_step, change.parts->handover());
-  if (draft.candidate != nullptr) note_fields(draft.core_step, draft.candidate->handover());
 }
 
 void TransactionCommit::Work::note_fields(int step, const Handover* handover) {
@@ -321,7 +320,7 @@ std::shared_ptr<Shadow> TransactionCommit::Work::prepare_candidate(DraftComponen
     changed.candidate = candidate;
     candidate->prepare(component.core());
   }
-  candidate->await_near(options.outputs, component, Shadow::kStateEnd);
+  candidate->await_near(options.outputs, changed.is_fresh, component);
   if (options_.dry_run || changed.promoted != nullptr) return candidate;
   prefault_allocated();
   host_->run_shadow(candidate);

@@ -62,6 +62,7 @@ Handover::Handover(CoreBase& old, CoreBase& fresh) : old_(old), fresh_(fresh) {
     } else {
       taken_.push_back(field.name);
       copies_.push_back({from->value, field.value, field.bytes});
+      bytes_ += field.bytes;
     }
   }
   if (stranger_ != nullptr && before.empty() && now.empty())
@@ -79,6 +80,24 @@ void Handover::copy() noexcept {
   if (copies_.empty()) return;
   is_whole_ = old_.store_state();
   for (const Copy& copy : copies_) std::memcpy(copy.to, copy.from, copy.bytes);
+  fresh_.load_state();
+}
+
+void Handover::save(std::byte* fields) noexcept {
+  if (copies_.empty()) return;
+  is_whole_ = old_.store_state();
+  for (const Copy& copy : copies_) {
+    std::memcpy(fields, copy.from, copy.bytes);
+    fields += copy.bytes;
+  }
+}
+
+void Handover::load(const std::byte* fields) noexcept {
+  if (copies_.empty()) return;
+  for (const Copy& copy : copies_) {
+    std::memcpy(copy.to, fields, copy.bytes);
+    fields += copy.bytes;
+  }
   fresh_.load_state();
 }
 

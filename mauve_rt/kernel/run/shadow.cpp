@@ -98,7 +98,9 @@ void Shadow::prepare(CoreBase& live) {
   try {
     connect_cells();
     bind();
-    if (!options_.is_fresh) handover_ = std::make_unique<Handover>(live, *parts_.core);
+    if (options_.is_fresh) return;
+    handover_ = std::make_unique<Handover>(live, *parts_.core);
+    capture_.make_room_for_state(handover_->bytes());
   } catch (const Error& error) {
     ErrorDetail detail = error.detail();
     if (detail.component.empty()) detail.component = component_;
@@ -164,13 +166,16 @@ void Shadow::start() noexcept {
   awaits_outputs_.store(false, std::memory_order_release);  // what follows is no step of the swap
 }
 
-bool Shadow::end_release(time_ns_t instant_ns, const State* next_wait) noexcept {
+bool Shadow::end_release(time_ns_t instant_ns, const State* next_wait, const CoreBase* live) noexcept {
   if (awaits_outputs()) [[unlikely]]
     return measure_steps();
   if (phase_.load(std::memory_order_acquire) != kRunning) return false;
   const std::int64_t from =
       next_wait != nullptr ? static_cast<std::int64_t>(next_wait->index) : ShadowCapture::kStart;
-  if (!capture_.end_release(instant_ns, from)) return false;
+  const bool is_captured = capture_.end_release(instant_ns, from);
+  if (follows_.load(std::memory_order_relaxed) && live != nullptr && handover_->is_from(*live))
+    handover_->save(capture_.next_state());
+  if (!is_captured) return false;
   if (signal_ != nullptr) {
     signal_->bump();
   } else {
@@ -195,19 +200,6 @@ bool Shadow::measure_steps() noexcept {
   if (!steps_->are_known()) return false;
   awaits_outputs_.store(false, std::memory_order_release);
   return true;
-}
-
-void Shadow::catch_up(const CoreBase* live) noexcept {
-  const std::uint64_t missed = capture_.skipped() + skipped_budget_.load(std::memory_order_relaxed);
-  if (handover_ == nullptr || live == nullptr || !handover_->is_from(*live) || missed == missed_) return;
-  if (!MAUVE_RT_TRUSTED(run_mutex_.try_lock())) return;  // in another wait
-  if (phase_.load(std::memory_order_acquire) == kRunning && parts_.core != nullptr) {
-    capture_.begin_anew();
-    debt_ = 0;
-    handover_->copy();
-    missed_ = capture_.skipped() + skipped_budget_.load(std::memory_order_relaxed);
-  }
-  MAUVE_RT_TRUSTED(run_mutex_.unlock());
 }
 
 std::unique_ptr<CoreBase> Shadow::hand_over() noexcept {
@@ -272,11 +264,11 @@ void Shadow::with_core(time_ns_t timeout_ns, const std::function<void(CoreBase&)
   use(*parts_.core);
 }
 
-void Shadow::await_near(const std::vector<GreatestStep>& outputs, Component& component,
-                        time_ns_t timeout_ns) {
+void Shadow::await_near(const std::vector<GreatestStep>& outputs, bool is_fresh, Component& component) {
   auto steps = std::make_unique<OutputSteps>(component.shell(), component_, outputs);
-  const auto run = lock_core(timeout_ns);
+  const auto run = lock_core(kStateEnd);
   near_.store(kNeverNear, std::memory_order_release);
+  follows_.store(!is_fresh && handover_ != nullptr, std::memory_order_relaxed);
   const LockGuard lock(figures_mutex_);
   steps_ = std::move(steps);
   awaiting_.set(component.task());

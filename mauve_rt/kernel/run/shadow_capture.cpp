@@ -83,6 +83,11 @@ ShadowCapture::ShadowCapture(const Shell& shell, const std::string& component) {
   for (Slot& slot : slots_) make_room(slot);
 }
 
+void ShadowCapture::make_room_for_state(std::size_t bytes) {
+  present_.state.resize(bytes);
+  for (Slot& slot : slots_) slot.state.resize(bytes);
+}
+
 ShadowCapture::~ShadowCapture() { detach(); }
 
 void ShadowCapture::attach(std::int64_t from) noexcept {
@@ -102,14 +107,8 @@ void ShadowCapture::start() noexcept {
   forget_release();
 }
 
-void ShadowCapture::begin_anew() noexcept {
-  std::uint64_t dropped = 0;
-  for (; front() != nullptr; ++dropped) pop();
-  skipped_.store(skipped_.load(std::memory_order_relaxed) + dropped, std::memory_order_relaxed);
-  is_anew_ = true;
-}
-
 void ShadowCapture::forget_release() noexcept {
+  present_.has_state = false;
   for (PortNote& note : present_.notes) note.is_noted = false;
 }
 
@@ -130,11 +129,14 @@ bool ShadowCapture::end_release(time_ns_t instant_ns, std::int64_t next_from) no
     slot.release = present_.release;
     std::copy(present_.notes.begin(), present_.notes.end(), slot.notes.begin());
     std::memcpy(slot.values.data(), present_.values.data(), present_.values.size());
+    slot.has_state = present_.has_state;
+    if (slot.has_state) std::memcpy(slot.state.data(), present_.state.data(), present_.state.size());
     filled_.store(filled + 1, std::memory_order_release);
     is_anew_ = false;
   } else {
     skipped_.store(skipped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
+  present_.has_state = false;
   for (PortNote& note : present_.notes) {
     note.is_noted = false;
     if (note.status == DataStatus::new_data) note.status = DataStatus::old_data;
@@ -157,6 +159,11 @@ void ShadowCapture::pop() noexcept {
 const ShadowCapture::PortNote& ShadowCapture::note(std::size_t port) const noexcept {
   MAUVE_EXPECTS(port < ports_.size());
   return slots_[emptied_.load(std::memory_order_relaxed) % kSlots].notes[port];
+}
+
+const std::byte* ShadowCapture::state() const noexcept {
+  const Slot& slot = slots_[emptied_.load(std::memory_order_relaxed) % kSlots];
+  return slot.has_state ? slot.state.data() : nullptr;
 }
 
 const std::byte* ShadowCapture::value(std::size_t port) const noexcept {

@@ -72,6 +72,7 @@ void Shadow::execute(const ShadowCapture::Release& release) {
     return;
   }
   take_properties();
+  if (const std::byte* const state = capture_.state()) handover_->load(state);
   put_inputs();
   clock_->set_now(release.instant_ns);
   const WithoutRing none;

@@ -33,7 +33,7 @@ void Task::start_shadow() noexcept {
 void Task::capture_release() noexcept {
   bool is_over = false;
   shadow_.use([&](Shadow& shadow) {
-    is_over = shadow.end_release(machine_.entered_ns(), machine_.present_wait());
+    is_over = shadow.end_release(machine_.entered_ns(), machine_.present_wait(), machine_.core());
   });
   if (is_over) leave_shadow();
 }

@@ -55,7 +55,8 @@ struct NewResource {
 struct ReplaceOptions {
   std::optional<ProbationOptions> probation{};  // probation.hpp
   /// Of a component that runs: only where its outputs are near those of the core that it replaces (output_steps.hpp). Until then it
-  /// executes in the component's shadow. Of one that is STOPPED it goes in at once.
+  /// executes in the component's shadow, each release with the state fields that the other core had before it. Of one that is STOPPED it
+  /// goes in at once.
   std::optional<BumplessOptions> bumpless{};
 };
 
@@ -155,7 +156,7 @@ class Transaction {
   /// Ends the component's shadow; without a shadow there is nothing to do.
   Transaction& end_shadow(const std::string& component);
   /// Replaces the live core by the candidate of the component's shadow. It gets copies of the live core's state fields of the same name
-  /// and type, and keeps its own state besides; in a bumpless change it keeps all of its own state, with which its outputs were near.
+  /// and type, and keeps its own state besides.
   Transaction& promote(const std::string& component, PromoteOptions options = {});
   /// Puts a core into a stopped component as it is; the component is to configure it before it starts (Listing 3).
   Transaction& place_core(const std::string& component, std::unique_ptr<CoreBase> core);

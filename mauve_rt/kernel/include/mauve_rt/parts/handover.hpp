@@ -34,6 +34,11 @@ class Handover {
   /// Copies the matching fields, and leaves the old core as it is. [rt] as far as the cores are.
   void copy() noexcept;
 
+  /// The matching fields as bytes, of which there are so many: of the old core, for the new one. [rt] as far as the cores are.
+  std::size_t bytes() const MAUVE_RT { return bytes_; }
+  void save(std::byte* fields) noexcept;
+  void load(const std::byte* fields) noexcept;
+
   /// Names of the fields that are taken over. [non-rt]
   const std::vector<std::string>& taken() const noexcept { return taken_; }
   /// One line for each field that is not: "gain: float32 before, float64 now". [non-rt]
@@ -52,6 +57,7 @@ class Handover {
   CoreBase& fresh_;
   std::unique_ptr<CoreBase> stranger_;  // in the place of an old core of another generation
   std::vector<Copy> copies_;
+  std::size_t bytes_{0};
   std::vector<std::string> taken_;
   std::vector<std::string> left_;
   bool is_whole_{true};

@@ -89,8 +89,9 @@ class PartsChange final : public CommitAction {
   /// fsm, another instance of the present fsm is made. [non-rt] Throws Error (prepare_failed) when that cannot be made.
   PartsChange(Component& component, Parts fresh);
   /// The new core is this candidate, which goes in where its outputs are near those of the core that runs (Shadow::await_near()). It
-  /// executes in the component's shadow until then, and keeps the state that it has. [non-rt] Throws as Shadow::with_core().
-  PartsChange(Component& component, std::shared_ptr<Shadow> candidate);
+  /// executes in the component's shadow until then. Unless it is `fresh` it gets copies of the old core's state fields. [non-rt] Throws as
+  /// Shadow::with_core().
+  PartsChange(Component& component, std::shared_ptr<Shadow> candidate, bool is_fresh);
   ~PartsChange() override;
 
   /// The shell that will be in force: where properties of a new one are set and its ports connected. [non-rt]

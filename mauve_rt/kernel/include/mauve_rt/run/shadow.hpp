@@ -116,7 +116,7 @@ struct ShadowParts {
 /// | near_             | who executes, who makes it wait             | the component's thread | release/acquire: the candidate's state after that release |
 /// | awaiting_         | who makes it wait                           | who executes           | its own: base/revocable_reference.hpp |
 /// | skipped_budget_   | who executes                                | anyone                 | relaxed: a lone number               |
-/// | missed_           | the component's thread                      | same                   | -                                    |
+/// | follows_          | who makes it wait for near outputs          | the component's thread | relaxed: a lone flag                 |
 /// | awaits_outputs_   | the component's thread, who closes it       | anyone                 | release/acquire: the steps           |
 /// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
@@ -146,8 +146,8 @@ class Shadow {
   bool has_begun() const MAUVE_RT { return phase_.load(std::memory_order_acquire) != kPrepared; }
   /// The component starts in its initial state. [rt]
   void start() MAUVE_RT;
-  /// A release has reached its next wait. Whether it is the last that is looked at. [rt]
-  bool end_release(time_ns_t instant_ns, const State* next_wait) MAUVE_RT;
+  /// A release of this core has reached its next wait. Whether it is the last that is looked at. [rt] as begin()
+  bool end_release(time_ns_t instant_ns, const State* next_wait, const CoreBase* live) MAUVE_RT;
   /// Ends it; does nothing when it has ended before. [rt], any thread
   void conclude(ShadowCause why, time_ns_t now_ns) MAUVE_RT;
   /// Captures no more: the component's ports refer to it no longer. [rt], or an ordinary thread that has claimed the component
@@ -158,9 +158,6 @@ class Shadow {
 
   /// Whether each listed output was near in the component's last release. [rt], the component's thread
   bool is_near() const MAUVE_RT { return near_.load(std::memory_order_acquire) == capture_.captured(); }
-  /// Where the candidate has missed releases it begins anew, with the state that this core has now: what it had goes. [rt] as begin(), the
-  /// component's thread, in this wait
-  void catch_up(const CoreBase* live) MAUVE_RT;
   /// The candidate's core, which executes no more here; nullptr: the shadow's thread looks at it this moment, or it has ended. [rt]
   std::unique_ptr<CoreBase> hand_over() MAUVE_RT;
   /// It was promoted: measures the first value of each listed output. Whether there is one to measure. [rt], the component's thread
@@ -193,11 +190,14 @@ class Shadow {
   void with_core(time_ns_t timeout_ns, const std::function<void(CoreBase&)>& use);
   /// What the candidate takes over from the live core as it begins; nullptr: nothing. [non-rt], after prepare()
   const Handover* handover() const noexcept { return handover_.get(); }
-  /// From now on the task is woken when the listed outputs are near. [non-rt] Throws Error: not_running (it waits for another change),
-  /// and as OutputSteps.
-  void await_near(const std::vector<GreatestStep>& outputs, Component& component, time_ns_t timeout_ns);
-  /// The reverse: the task is woken no more. [non-rt]
-  void end_await() noexcept { awaiting_.revoke(kForever); }
+  /// From now on the task is woken when the listed outputs are near. Unless the candidate is fresh it begins each release with the state
+  /// fields that the live core had before it. [non-rt] Throws Error as suspend(), and as OutputSteps.
+  void await_near(const std::vector<GreatestStep>& outputs, bool is_fresh, Component& component);
+  /// The reverse. [non-rt]
+  void end_await() noexcept {
+    awaiting_.revoke(kForever);
+    follows_.store(false, std::memory_order_relaxed);
+  }
   /// Puts that core back in, after a refused change; nullptr, or one that was cleaned up, ends the shadow. [non-rt]
   void resume(std::unique_ptr<CoreBase> core) noexcept;
   /// Sets a property of the candidate's shell, before the candidate executes next, to a value that checked() returned. [non-rt]
@@ -246,7 +246,7 @@ class Shadow {
   RevocableReference<Task> awaiting_;
   Atomic<bool> awaits_outputs_{false};
   Atomic<std::uint64_t> skipped_budget_{0};
-  std::uint64_t missed_{0};  // releases, as of the last time that it caught up
+  Atomic<bool> follows_{false};
 
   Atomic<std::uint32_t> phase_{kPrepared};
   Atomic<time_ns_t> executing_since_ns_{0};

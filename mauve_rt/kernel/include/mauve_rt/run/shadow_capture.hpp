@@ -59,8 +59,16 @@ class ShadowCapture {
   ShadowCapture(const ShadowCapture&) = delete;
   ShadowCapture& operator=(const ShadowCapture&) = delete;
 
+  /// Makes room for so many bytes of a core's state, with each release. [setup]
+  void make_room_for_state(std::size_t bytes);
+
   // ---- the component's thread, or who acts for a parked component
 
+  /// The state that the core has in this wait, to be written: it goes with the release that follows. [rt]
+  std::byte* next_state() MAUVE_RT {
+    present_.has_state = true;
+    return present_.state.data();
+  }
   /// Captures from now on; `from` as in Release. [rt]
   void attach(std::int64_t from) MAUVE_RT;
   /// Captures no longer: no thread uses this afterwards through the ports. May be called again. [rt]
@@ -74,9 +82,6 @@ class ShadowCapture {
   const std::byte* present(std::size_t port) const MAUVE_RT;
   /// Whether it was read or written since the last release ended. [rt]
   bool is_noted(std::size_t port) const MAUVE_RT { return present_.notes[port].is_noted; }
-  /// What waits in the slots is skipped, and the next release is the first one of a candidate that begins anew. [rt], no other thread
-  /// empties slots meanwhile
-  void begin_anew() MAUVE_RT;
   /// The release that ends is for no candidate. [rt]
   void forget_release() MAUVE_RT;
 
@@ -88,6 +93,8 @@ class ShadowCapture {
   /// Of the oldest release, by the port's place in the shell. [rt]
   const PortNote& note(std::size_t port) const MAUVE_RT;
   const std::byte* value(std::size_t port) const MAUVE_RT;
+  /// The state that the core had before it; nullptr: it was not written. [rt]
+  const std::byte* state() const MAUVE_RT;
 
   // ---- anyone
 
@@ -101,6 +108,8 @@ class ShadowCapture {
     Release release{};
     std::vector<PortNote> notes{};
     std::vector<std::byte> values{};
+    std::vector<std::byte> state{};
+    bool has_state{false};
   };
 
   std::vector<std::unique_ptr<Tap>> ports_;
