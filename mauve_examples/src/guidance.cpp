@@ -9,17 +9,33 @@ namespace mauve_examples {
 bool Guidance::configure_hook() {
   const GridMap world = load_map(shell().map.value());
   pilot_.configure(world, static_cast<std::uint8_t>(shell().number.value()));
+  operator_goal_.emplace(shell().operator_goal, shell().lookup,
+                         mauve::TransformedReadPort<PoseStamped>::Options{.to = shell().goal.frames()->frame});
   scan_ = std::make_unique<Scan>();
   (void)beam_table();  // computed at its first use, which is not to be in real time
   return true;
+}
+
+void Guidance::read_goals() {
+  // A goal whose transform is not there yet is read once more at the next release.
+  if (const auto order = operator_goal_->read(); order && order.time_ns > order_ns_) {
+    order_ns_ = order.time_ns;
+    is_ordered_ = true;
+    const auto& place = order.value.pose.position;
+    pilot_.set_goal({place.x, place.y, place.z});
+  } else if (!pilot_.wants_path() && !pilot_.has_path()) {
+    is_ordered_ = false;
+  }
+  if (is_ordered_) return;
+  if (const mauve::Sample<Point> goal = shell().goal.read(); goal.status != mauve::DataStatus::none)
+    pilot_.set_goal(goal.value);
 }
 
 void Guidance::read_inputs() {
   const mauve::Sample<Pose2D> pose = shell().pose.read();
   if (pose.status == mauve::DataStatus::none) return;
   shell().scan.read(*scan_);
-  if (const mauve::Sample<Point> goal = shell().goal.read(); goal.status != mauve::DataStatus::none)
-    pilot_.set_goal(goal.value);
+  read_goals();
   shell().map_get([this](const OccupancyGrid& map) { pilot_.read_map(map); });
   pilot_.look(*scan_, pose.value, clock_ns());
 }
