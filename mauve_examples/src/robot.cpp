@@ -13,8 +13,7 @@ namespace {
 
 /// Of a frame that the port declares.
 mauve::FrameName own_frame(const mauve::PortBase& port, std::string mauve::Frames::* which) {
-  const mauve::Frames* const declared = port.frames();
-  const std::string& name = (declared == nullptr ? mauve::Frames{} : *declared).*which;
+  const std::string name = port.frames() == nullptr ? "" : port.frames()->*which;
   mauve::FrameName frame;
   if (!name.empty() && frame.assign(name)) return frame;
   const bool is_child = which == &mauve::Frames::child_frame;

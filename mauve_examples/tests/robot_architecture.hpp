@@ -37,7 +37,8 @@ struct GeneratedFsms {
 template <typename Fsms>
 class RobotArchitectureOf {
  public:
-  explicit RobotArchitectureOf(const std::string& map_name, const std::string& peers = "") {
+  explicit RobotArchitectureOf(const std::string& map_name, const std::string& peers = "",
+                               bool declares_odometry = true) {
     const std::string map = own_map(map_name).string();
     world_ = load_map(map);
     start_ = start_poses(world_, 1, 4)[0];
@@ -53,7 +54,7 @@ class RobotArchitectureOf {
         architecture_.add_component<ExplorationShell, Exploration, typename Fsms::ExplorationFsm>(
             "exploration", {.priority = 40});
     declare(robot, "pose", "map", "robot_1/base");
-    declare(robot, "odometry", "robot_1/odom", "robot_1/base");
+    if (declares_odometry) declare(robot, "odometry", "robot_1/odom", "robot_1/base");
     declare(robot, "scan", "robot_1/scan");
     robot.set_property("start_x", start_.x);
     robot.set_property("start_y", start_.y);

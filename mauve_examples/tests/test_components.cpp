@@ -144,7 +144,9 @@ TEST(Components, TheFramesOfARobotAreThoseOfItsPose) {
   simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(20));
   EXPECT_GT(distance_m(robot.pose(), robot.start()), 1.0);
   expect_frames();
-  host.swap_core("robot", std::make_unique<Robot>());
+  mauve::Transaction change;
+  change.replace_core("robot", std::make_unique<Robot>());
+  host.commit(std::move(change));
   simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(22));
   expect_frames();
   simulation.shutdown();
@@ -174,17 +176,12 @@ TEST(Components, AnOperatorsGoalIsReadInAnyFrameAndGoesFirst) {
 }
 
 TEST(Components, ARobotWithoutDeclaredFramesIsRefused) {
-  mauve::Architecture architecture;
-  auto& robot = architecture.add_component<RobotShell, Robot, RobotFsm>("robot", {.priority = 80});
-  robot.set_property("map", testing::own_map("arena").string());
-  const Pose2D start = start_poses(load_map(testing::own_map("arena").string()), 1, 4)[0];
-  robot.set_property("start_x", start.x);
-  robot.set_property("start_y", start.y);
+  RobotArchitecture robot("arena", "", false);
   try {
-    robot.core().configure();
+    robot.architecture().configure();
     FAIL() << "configured";
   } catch (const mauve::Error& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("odometry"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("port odometry"));
     EXPECT_THAT(error.what(), ::testing::HasSubstr("`frames` of the component"));
   }
 }
