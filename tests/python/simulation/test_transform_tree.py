@@ -77,6 +77,12 @@ def test_outcomes_are_those_of_the_message(running: Running, log: list[Execution
     assert (asked[0].outcome, asked[0].frame) == (TransformOutcome.UNKNOWN_FRAME, "moon")
 
 
+def test_a_request_port_takes_the_name_of_a_service():
+    assert request_port("mauve_msgs/srv/SetTransform").service is SetTransform
+    with pytest.raises(TypeError, match="found 'mauve_msgs/srv/Nothing'"):
+        request_port("mauve_msgs/srv/Nothing")
+
+
 def test_a_request_port_takes_its_own_service_alone():
     with Stage() as stage:
         stage.add("look", LookShell, IdleCore, ActFsm)
