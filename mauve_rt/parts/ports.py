@@ -217,7 +217,7 @@ class RequestPort(Member):
 
     def __init__(self, service: Any) -> None:
         super().__init__()
-        self.service = (service_class(service) or service) if isinstance(service, str) else service
+        self.service: Any = (service_class(service) or service) if isinstance(service, str) else service
         self.type = messages.service_name(self.service)
 
     def declare(self, builder: ShellBuilder) -> None:

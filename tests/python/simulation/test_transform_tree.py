@@ -91,7 +91,7 @@ def test_a_request_port_takes_its_own_service_alone():
             stage.architecture.connect("look", "lookup", "frames", "set")
         assert refused.value.code == "type_mismatch"
     with pytest.raises(TypeError, match="expected a class of a ROS service"):
-        request_port("mauve_msgs/srv/SetTransform")
+        request_port(LookupTransform.Request)
 
 
 def test_sizes_are_checked():
