@@ -8,15 +8,17 @@ namespace mauve_examples {
 
 namespace {
 
-constexpr std::int64_t kOperatorPatience_ns = 10'000'000'000;  // without a path for so long, an operator's goal is given up
+constexpr std::int64_t kOperatorPatience_ns =
+    10'000'000'000;  // without a path for so long, an operator's goal is given up
 
 }  // namespace
 
 bool Guidance::configure_hook() {
   const GridMap world = load_map(shell().map.value());
   pilot_.configure(world, static_cast<std::uint8_t>(shell().number.value()));
-  operator_goal_.emplace(shell().operator_goal, shell().lookup,
-                         mauve::TransformedReadPort<PoseStamped>::Options{.to = shell().goal.frames()->frame});
+  operator_goal_.emplace(
+      shell().operator_goal, shell().lookup,
+      mauve::TransformedReadPort<PoseStamped>::Options{.to = shell().goal.frames()->frame});
   scan_ = std::make_unique<Scan>();
   (void)beam_table();  // computed at its first use, which is not to be in real time
   return true;

@@ -17,12 +17,13 @@ mauve::FrameName own_frame(const mauve::PortBase& port, std::string mauve::Frame
   mauve::FrameName frame;
   if (!name.empty() && frame.assign(name)) return frame;
   const bool is_child = which == &mauve::Frames::child_frame;
-  throw mauve::Error(mauve::ErrorCode::configure_failed, "the frame of a port is missing or too long",
-                     {.element = "port " + port.name(),
-                      .expected = std::string(is_child ? "child_frame" : "frame") + ", at most " +
-                                  std::to_string(mauve::FrameName::capacity()) + " characters",
-                      .found = name.empty() ? "none" : name,
-                      .remedy = "declare it under `frames` of the component, as architecture/robot.yaml does"});
+  throw mauve::Error(
+      mauve::ErrorCode::configure_failed, "the frame of a port is missing or too long",
+      {.element = "port " + port.name(),
+       .expected = std::string(is_child ? "child_frame" : "frame") + ", at most " +
+                   std::to_string(mauve::FrameName::capacity()) + " characters",
+       .found = name.empty() ? "none" : name,
+       .remedy = "declare it under `frames` of the component, as architecture/robot.yaml does"});
 }
 
 mauve::Transform transform_of(const Pose2D& pose) {

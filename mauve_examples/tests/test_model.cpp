@@ -129,12 +129,12 @@ struct GuidanceShell : mauve::Shell {
   mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
   mauve::ReadPort<Point>& goal = read_port<Point>("goal").in_frame("map");
   mauve::ReadPort<PoseStamped>& operator_goal = read_port<PoseStamped>("operator_goal").optional();
-  mauve::WritePort<Point>& target =
-      write_port<Point>("target",
-                        {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold})
-          .in_frame("map");
+  mauve::WritePort<Point>& target = write_port<Point>("target", {.on_commit = mauve::OutputPolicy::hold,
+                                                                 .on_stop = mauve::OutputPolicy::hold})
+                                        .in_frame("map");
   mauve::CallPort<void(MapReader)>& map_get = call_port<void(MapReader)>("map_get", kMapReaderType);
-  mauve::CallPort<mauve::CallOf<mauve::LookupTransform>>& lookup = call_port<mauve::LookupTransform>("lookup");
+  mauve::CallPort<mauve::CallOf<mauve::LookupTransform>>& lookup =
+      call_port<mauve::LookupTransform>("lookup");
 };
 }  // namespace hand_written
 

@@ -36,9 +36,9 @@ class Guidance final : public GuidanceCore {
 
   Pilot pilot_;
   std::optional<mauve::TransformedReadPort<PoseStamped>> operator_goal_;  // in the frame of goals
-  mauve::time_ns_t operator_goal_ns_{0};  // when the last one came
-  mauve::time_ns_t has_path_ns_{0};       // when there was a path to that goal
-  bool is_operated_{false};               // on its way to that goal
+  mauve::time_ns_t operator_goal_ns_{0};                                  // when the last one came
+  mauve::time_ns_t has_path_ns_{0};  // when there was a path to that goal
+  bool is_operated_{false};          // on its way to that goal
   std::unique_ptr<Scan> scan_;
 };
 

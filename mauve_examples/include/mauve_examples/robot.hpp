@@ -41,10 +41,10 @@ class Robot final : public RobotCore {
   std::unique_ptr<Scan> walls_;  // without robots: as before while this one stands
   Pose2D seen_from_;
   mauve::BoundedVector<RobotBody, kMaxOthers> others_;  // where they were when they last said so
-  Pose2D start_;                                         // the odometry's origin
-  mauve::SetTransform::Request odom_;                    // in the map
-  mauve::SetTransform::Request base_;                    // in the odometry's frame
-  mauve::SetTransform::Request scanner_;                 // at the base
+  Pose2D start_;                                        // the odometry's origin
+  mauve::SetTransform::Request odom_;                   // in the map
+  mauve::SetTransform::Request base_;                   // in the odometry's frame
+  mauve::SetTransform::Request scanner_;                // at the base
   bool are_static_frames_set_{false};
   std::int64_t steps_{0};
   std::int64_t collisions_{0};

@@ -120,7 +120,12 @@ def test_the_bags_hold_what_those_of_the_real_demo_hold(mission: Demo):
     for robot in ROBOTS:
         bag = mission.out / "bag" / robot
         assert_rosbag2_reads(bag)
-        assert {*(f"/{robot}/{name}" for name in own + executor), "/radio/link", "/tf", "/tf_static"} <= topics(bag).keys()
+        assert {
+            *(f"/{robot}/{name}" for name in own + executor),
+            "/radio/link",
+            "/tf",
+            "/tf_static",
+        } <= topics(bag).keys()
         decisions = [one.decision for one in messages(bag, f"/{robot}/executor/decisions")]
         assert decisions[-6:] == ["condition_true", "do", "done", "condition_false", "undo", "done"]
 
@@ -138,7 +143,9 @@ def test_the_frames_are_those_of_the_poses(mission: Demo):
     for robot in ROBOTS:
         bag = mission.out / "bag" / robot
         [fixed] = messages(bag, "/tf_static")
-        static = {(each.header.frame_id, each.child_frame_id): matrix(each.transform) for each in fixed.transforms}
+        static = {
+            (each.header.frame_id, each.child_frame_id): matrix(each.transform) for each in fixed.transforms
+        }
         assert static.keys() == {("map", f"{robot}/odom"), (f"{robot}/base", f"{robot}/scan")}
         poses = timed(bag, f"/{robot}/pose")
         moving = timed(bag, "/tf")
