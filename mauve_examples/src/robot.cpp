@@ -2,11 +2,36 @@
 #include "mauve_examples/robot.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "mauve_examples/disc_collision.hpp"
 #include "mauve_examples/ray_caster.hpp"
 
 namespace mauve_examples {
+
+namespace {
+
+/// Of a frame that the port declares.
+mauve::FrameName own_frame(const mauve::PortBase& port, std::string mauve::Frames::* which) {
+  const std::string name = port.frames() == nullptr ? "" : port.frames()->*which;
+  mauve::FrameName frame;
+  if (!name.empty() && frame.assign(name)) return frame;
+  const bool is_child = which == &mauve::Frames::child_frame;
+  throw mauve::Error(
+      mauve::ErrorCode::configure_failed, "the frame of a port is missing or too long",
+      {.element = "port " + port.name(),
+       .expected = std::string(is_child ? "child_frame" : "frame") + ", at most " +
+                   std::to_string(mauve::FrameName::capacity()) + " characters",
+       .found = name.empty() ? "none" : name,
+       .remedy = "declare it under `frames` of the component, as architecture/robot.yaml does"});
+}
+
+mauve::Transform transform_of(const Pose2D& pose) {
+  return {.translation = {.x = pose.x, .y = pose.y, .z = 0.0},
+          .rotation = {.x = 0.0, .y = 0.0, .z = std::sin(pose.theta / 2.0), .w = std::cos(pose.theta / 2.0)}};
+}
+
+}  // namespace
 
 bool Robot::configure_hook() {
   world_ = load_map(shell().map.value());
@@ -22,6 +47,13 @@ bool Robot::configure_hook() {
                   shell().map.value(),
          .remedy = "start it elsewhere"});
   }
+  const mauve::FrameName odom = own_frame(shell().odometry, &mauve::Frames::frame);
+  const mauve::FrameName base = own_frame(shell().odometry, &mauve::Frames::child_frame);
+  odom_ = {.parent = own_frame(shell().pose, &mauve::Frames::frame), .child = odom, .is_static = true};
+  base_ = {.parent = odom, .child = base};
+  scanner_ = {.parent = base, .child = own_frame(shell().scan, &mauve::Frames::frame), .is_static = true};
+  are_static_frames_set_ = false;
+  start_ = body_.pose;
   scan_ = std::make_unique<Scan>();
   walls_ = std::make_unique<Scan>();
   (void)beam_table();  // computed at its first use, which is not to be in real time
@@ -69,6 +101,23 @@ void Robot::meet_others() {
     shell().body.write({number, body_.pose.x, body_.pose.y, shell().radius.value()});
 }
 
+void Robot::set_frame(mauve::SetTransform::Request& request, const mauve::Transform& transform) {
+  request.transform = transform;
+  request.time_ns = clock_ns();
+  mauve::SetTransform::Response response;
+  shell().set_frame(request, response);
+}
+
+void Robot::set_frames() {
+  const Pose2D odometry = pose_from(start_, body_.pose);
+  shell().odometry.write(odometry);
+  set_frame(base_, transform_of(odometry));
+  if (are_static_frames_set_) return;
+  are_static_frames_set_ = true;
+  set_frame(odom_, transform_of(start_));
+  set_frame(scanner_, {});  // beams begin at the centre, and beam 0 points ahead
+}
+
 void Robot::sense() {
   meet_others();
   const auto range_m = static_cast<float>(shell().max_range.value());
@@ -78,6 +127,7 @@ void Robot::sense() {
   seen_from_ = body_.pose;
   *scan_ = *walls_;
   scan_robots(others_, body_.pose, *scan_);
+  set_frames();  // before values of this time are there
   // One right after the other: who reads both on another CPU seldom gets one of them without the other.
   shell().pose.write(body_.pose);
   shell().scan.write(*scan_);
@@ -86,6 +136,7 @@ void Robot::sense() {
 void Robot::take(mauve::CoreBase& old) noexcept {
   if (const auto* robot = dynamic_cast<const Robot*>(&old)) {
     body_ = robot->body_;
+    start_ = robot->start_;
     others_ = robot->others_;
     collisions_ = robot->collisions_;
   }

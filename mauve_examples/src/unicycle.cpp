@@ -23,6 +23,14 @@ double wrap_angle(double angle_rad) noexcept {
   return wrapped <= -std::numbers::pi ? std::numbers::pi : wrapped;
 }
 
+Pose2D pose_from(const Pose2D& origin, const Pose2D& pose) noexcept {
+  const double cosine = std::cos(origin.theta);
+  const double sine = std::sin(origin.theta);
+  const double x = pose.x - origin.x;
+  const double y = pose.y - origin.y;
+  return {x * cosine + y * sine, y * cosine - x * sine, wrap_angle(pose.theta - origin.theta)};
+}
+
 void Unicycle::step(const Twist& command, const UnicycleLimits& limits, double step_s) noexcept {
   speed_mps = approach(speed_mps, command.linear.x, limits.speed_mps, limits.acceleration_mps2 * step_s);
   turn_rate_radps = approach(turn_rate_radps, command.angular.z, limits.turn_rate_radps,

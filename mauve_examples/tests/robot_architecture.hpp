@@ -37,7 +37,8 @@ struct GeneratedFsms {
 template <typename Fsms>
 class RobotArchitectureOf {
  public:
-  explicit RobotArchitectureOf(const std::string& map_name, const std::string& peers = "") {
+  explicit RobotArchitectureOf(const std::string& map_name, const std::string& peers = "",
+                               bool declares_odometry = true) {
     const std::string map = own_map(map_name).string();
     world_ = load_map(map);
     start_ = start_poses(world_, 1, 4)[0];
@@ -52,6 +53,9 @@ class RobotArchitectureOf {
     auto& exploration =
         architecture_.add_component<ExplorationShell, Exploration, typename Fsms::ExplorationFsm>(
             "exploration", {.priority = 40});
+    declare(robot, "pose", "map", "robot_1/base");
+    if (declares_odometry) declare(robot, "odometry", "robot_1/odom", "robot_1/base");
+    declare(robot, "scan", "robot_1/scan");
     robot.set_property("start_x", start_.x);
     robot.set_property("start_y", start_.y);
     robot.set_property("start_yaw", start_.theta);
@@ -60,6 +64,9 @@ class RobotArchitectureOf {
     exploration.set_property("peers", peers);
 
     auto& pose = architecture_.add_resource<mauve::SharedData<Pose2D>>("pose");
+    auto& odometry = architecture_.add_resource<mauve::SharedData<Pose2D>>("odometry");
+    auto& frames = architecture_.add_resource<mauve::TransformTree>("frames", 8U);
+    auto& operator_goal = architecture_.add_resource<mauve::SharedData<PoseStamped>>("operator_goal");
     auto& command = architecture_.add_resource<mauve::SharedData<Twist>>("command");
     auto& scan = architecture_.add_resource<mauve::SharedData<Scan>>("scan");
     auto& body = architecture_.add_resource<mauve::SharedData<RobotBody>>("body");
@@ -80,7 +87,9 @@ class RobotArchitectureOf {
     };
     connect(robot, "command", command, "read");
     connect(robot, "pose", pose, "write");
+    connect(robot, "odometry", odometry, "write");
     connect(robot, "scan", scan, "write");
+    connect(robot, "set_frame", frames, "set");
     connect(robot, "body", body, "write");
     connect(robot, "bodies", bodies, "read");
     connect(control, "scan", scan, "read");
@@ -90,6 +99,8 @@ class RobotArchitectureOf {
     connect(control, "command", command, "write");
     connect(guidance, "pose", pose, "read");
     connect(guidance, "goal", goal, "read");
+    connect(guidance, "operator_goal", operator_goal, "read");
+    connect(guidance, "lookup", frames, "lookup");
     connect(guidance, "target", target, "write");
     connect(guidance, "map_get", own_map, "get");
     connect(mapping, "pose", pose, "read");
@@ -106,6 +117,9 @@ class RobotArchitectureOf {
     done_ = &done;
     goal_ = &goal;
     pose_ = &pose;
+    odometry_ = &odometry;
+    frames_ = &frames;
+    operator_goal_ = &operator_goal;
     command_ = &command;
   }
 
@@ -129,6 +143,9 @@ class RobotArchitectureOf {
   }
   bool done() { return value(*done_).data; }
   Pose2D pose() { return value(*pose_); }
+  Pose2D odometry() { return value(*odometry_); }
+  const mauve::TransformBuffer& frames() const { return frames_->buffer(); }
+  void order(const PoseStamped& goal, mauve::time_ns_t now_ns) { operator_goal_->write.write(goal, now_ns); }
   void command(const Twist& twist, mauve::time_ns_t now_ns) { command_->write.write(twist, now_ns); }
   std::uint64_t goals() {
     Point goal;
@@ -149,6 +166,10 @@ class RobotArchitectureOf {
   }
 
  private:
+  static void declare(mauve::Component& component, const char* port, const char* frame,
+                      const char* child = "") {
+    component.shell().find_port(port)->declare_frames({.frame = frame, .child_frame = child});
+  }
   template <typename T>
   T value(mauve::SharedData<T>& resource) {
     T value{};
@@ -165,6 +186,9 @@ class RobotArchitectureOf {
   mauve::SharedData<Bool>* done_{nullptr};
   mauve::SharedData<Point>* goal_{nullptr};
   mauve::SharedData<Pose2D>* pose_{nullptr};
+  mauve::SharedData<Pose2D>* odometry_{nullptr};
+  mauve::TransformTree* frames_{nullptr};
+  mauve::SharedData<PoseStamped>* operator_goal_{nullptr};
   mauve::SharedData<Twist>* command_{nullptr};
 };
 

@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // The five components on real threads: one robot explores a room, its exploration core is replaced on the
 // way.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <thread>
 
 #include "robot_architecture.hpp"
@@ -107,6 +110,80 @@ TEST(Components, ARobotStandsStillOnceCommandsNoLongerCome) {
   EXPECT_LT(distance_m(stopped, last), 0.03);
   simulation.shutdown();
   robot.expect_no_faults();
+}
+
+/// Where a frame is in the map; looked up at a time at which the robot set it.
+Pose2D in_map(const RobotArchitecture& robot, const char* frame, mauve::time_ns_t time_ns) {
+  const mauve::TransformBuffer& frames = robot.frames();
+  const mauve::TransformLookup found =
+      frames.lookup(frames.find("map").value(), frames.find(frame).value(), time_ns);
+  EXPECT_EQ(mauve::TransformOutcome::done, found.outcome) << frame;
+  const mauve::Transform& transform = found.transform;
+  return {transform.translation.x, transform.translation.y,
+          2.0 * std::atan2(transform.rotation.z, transform.rotation.w)};
+}
+
+void expect_equal(const Pose2D& expected, const Pose2D& found) {
+  EXPECT_NEAR(expected.x, found.x, 1e-9);
+  EXPECT_NEAR(expected.y, found.y, 1e-9);
+  EXPECT_NEAR(0.0, wrap_angle(expected.theta - found.theta), 1e-9);
+}
+
+TEST(Components, TheFramesOfARobotAreThoseOfItsPose) {
+  RobotArchitecture robot("arena");
+  robot.architecture().configure();
+  mauve::Simulation simulation;
+  mauve::SimulatedHost& host = simulation.add(robot.architecture());
+  simulation.deploy();
+  const auto expect_frames = [&] {
+    expect_equal(robot.pose(), in_map(robot, "robot_1/base", mauve::kLatestCommon));
+    expect_equal(robot.pose(), in_map(robot, "robot_1/scan", mauve::kLatestCommon));
+    expect_equal(robot.start(), in_map(robot, "robot_1/odom", mauve::kLatestCommon));
+    expect_equal(pose_from(robot.start(), robot.pose()), robot.odometry());
+  };
+  simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(20));
+  EXPECT_GT(distance_m(robot.pose(), robot.start()), 1.0);
+  expect_frames();
+  mauve::Transaction change;
+  change.replace_core("robot", std::make_unique<Robot>());
+  host.commit(std::move(change));
+  simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(22));
+  expect_frames();
+  simulation.shutdown();
+  robot.expect_no_faults();
+}
+
+TEST(Components, AnOperatorsGoalIsReadInAnyFrameAndGoesFirst) {
+  RobotArchitecture robot("arena");
+  robot.architecture().configure();
+  mauve::Simulation simulation;
+  simulation.add(robot.architecture());
+  simulation.deploy();
+  simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(20));
+  PoseStamped back;  // to the start, which is the origin of the odometry
+  back.header.frame_id = "robot_1/odom";
+  ASSERT_GT(distance_m(robot.pose(), robot.start()), 2.0);
+  robot.order(back, simulation.now_ns());
+  double nearest_m = 1e9;
+  for (int second = 21; second <= 60; ++second) {
+    simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(second));
+    nearest_m = std::min(nearest_m, distance_m(robot.pose(), robot.start()));
+  }
+  EXPECT_LT(nearest_m, 0.6);
+  EXPECT_GT(distance_m(robot.pose(), robot.start()), 1.0) << "it went on exploring";
+  simulation.shutdown();
+  robot.expect_no_faults();
+}
+
+TEST(Components, ARobotWithoutDeclaredFramesIsRefused) {
+  RobotArchitecture robot("arena", "", false);
+  try {
+    robot.architecture().configure();
+    FAIL() << "configured";
+  } catch (const mauve::Error& error) {
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("port odometry"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("`frames` of the component"));
+  }
 }
 
 TEST(Components, ARobotThatDoesNotFitIsRefused) {

@@ -125,12 +125,16 @@ struct GuidanceShell : mauve::Shell {
                                                     .maximum = 16,
                                                     .structural = mauve::ReadBy::core});
 
-  mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose");
+  mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose").in_frame("map");
   mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
-  mauve::ReadPort<Point>& goal = read_port<Point>("goal");
-  mauve::WritePort<Point>& target = write_port<Point>(
-      "target", {.on_commit = mauve::OutputPolicy::hold, .on_stop = mauve::OutputPolicy::hold});
+  mauve::ReadPort<Point>& goal = read_port<Point>("goal").in_frame("map");
+  mauve::ReadPort<PoseStamped>& operator_goal = read_port<PoseStamped>("operator_goal").optional();
+  mauve::WritePort<Point>& target = write_port<Point>("target", {.on_commit = mauve::OutputPolicy::hold,
+                                                                 .on_stop = mauve::OutputPolicy::hold})
+                                        .in_frame("map");
   mauve::CallPort<void(MapReader)>& map_get = call_port<void(MapReader)>("map_get", kMapReaderType);
+  mauve::CallPort<mauve::CallOf<mauve::LookupTransform>>& lookup =
+      call_port<mauve::LookupTransform>("lookup");
 };
 }  // namespace hand_written
 
@@ -183,6 +187,7 @@ TEST(Model, TheGeneratedShellDeclaresWhatListing1Does) {
     EXPECT_EQ(by_hand.kind(), port.kind());
     EXPECT_EQ(by_hand.type(), port.type());
     EXPECT_EQ(by_hand.is_required(), port.is_required());
+    EXPECT_EQ(by_hand.frames(), port.frames()) << port.name();
     EXPECT_EQ(by_hand.output().on_commit, port.output().on_commit) << port.name();
     EXPECT_EQ(by_hand.output().on_stop, port.output().on_stop) << port.name();
   }

@@ -82,6 +82,7 @@ _RESOURCE_KIND = Text(
     rf"{'|'.join(given_kinds())}|{_PLUGIN}",
     f"{', '.join(given_kinds())} or the name of a plug-in, package/Class",
 )
+_STATIC_DEPTH = 100  # as of tf2's listeners: each publisher's last message waits for who comes later
 _DURATION_MS = Real(least=0, most=_LONGEST_MS)
 
 
@@ -425,6 +426,15 @@ class ResourceModel(Section):
         kind = given_kinds().get(self.kind)
         initial = {each.name: each.initial for each in kind.parameters} if kind is not None else {}
         return self.parameters.get(name, initial.get(name))
+
+    @property
+    def static_topic(self) -> TopicModel | None:
+        """The topic of its static transforms; None: there is none."""
+        name = self.parameter("static_topic")
+        if self.topic is None or not name:
+            return None
+        qos = QosModel(profile="transient_local", depth=_STATIC_DEPTH)
+        return TopicModel(name=name, direction=self.topic.direction, qos=qos)
 
     @property
     def topic_type(self) -> str:

@@ -97,7 +97,9 @@ def _port(model: PackageModel, one: PortModel) -> str:
     if one.event:
         return f"api.event_port({', '.join(optional)})"
     if one.call is not None:
-        return f"api.call_port({one.call.name if isinstance(one.call, CppCall) else one.call!r})"
+        name = one.call.name if isinstance(one.call, CppCall) else one.call
+        is_of_kernel = name.startswith("mauve_msgs/srv/")  # such as a transform_tree's, in C++
+        return f"api.{'request_port' if is_of_kernel else 'call_port'}({name!r})"
     if one.read_type is not None:
         return f"api.read_port({', '.join([repr(model.registered_type(one.read_type.item)), *optional])})"
     written = repr(model.registered_type(one.write.item)) if one.write is not None else ""

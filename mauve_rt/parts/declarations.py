@@ -108,7 +108,7 @@ def transformed_read_port(
 
 
 def request_port(service: Any) -> RequestPort:
-    """A port that calls a service of a resource in C++: a class of a ROS service."""
+    """A port that calls a service of a resource in C++: a class of a ROS service, or its name."""
     return RequestPort(service)
 
 

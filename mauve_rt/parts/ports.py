@@ -12,6 +12,7 @@ from typing import Any, Generic, Literal, ParamSpec, TypeVar
 
 from mauve_rt._kernel import Duration, ShellBuilder, ShellView
 from mauve_rt.parts import messages
+from mauve_rt.parts.message_types import service_class
 
 __all__ = [
     "CallPort",
@@ -216,8 +217,8 @@ class RequestPort(Member):
 
     def __init__(self, service: Any) -> None:
         super().__init__()
-        self.type = messages.service_name(service)
-        self.service = service
+        self.service: Any = (service_class(service) or service) if isinstance(service, str) else service
+        self.type = messages.service_name(self.service)
 
     def declare(self, builder: ShellBuilder) -> None:
         """Tell the kernel."""

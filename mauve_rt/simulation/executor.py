@@ -32,7 +32,7 @@ from mauve_rt.model.schema import ResourceModel, TopicModel
 from mauve_rt.model.threads import uses_of
 from mauve_rt.simulation.messages import serialize
 from mauve_rt.simulation.rules import DECISIONS_QOS, SimulatedRules
-from mauve_rt.simulation.topics import S, Sample, SimulatedTopics, resolved, stamp
+from mauve_rt.simulation.topics import S, Sample, SimulatedTopics, in_virtual_time, resolved, stamp
 from mauve_rt.supervision.rule_actions import rule_actions
 from mauve_rt.supervision.rules import RulesFile
 from mauve_rt.trace.bag.recorded import SentMessage
@@ -114,6 +114,10 @@ class SimulatedExecutor:
         if bound.direction == "publish":
             qos = qos_profile(bound.qos, capacity=described.parameters.get("capacity", 0))
             self._outgoing[resource] = _Outgoing(topic, described.topic_type, qos)
+            if (static := described.static_topic) is not None:
+                topic = resolved(static.name, self.namespace)
+                outgoing = _Outgoing(topic, described.topic_type, qos_profile(static.qos))
+                self._outgoing[f"{resource}.static"] = outgoing
             return
 
         def receive(sample: Sample) -> None:
@@ -199,9 +203,10 @@ class SimulatedExecutor:
         """Publish what was written to bound resources; rules see what befell components."""
         self._look_at_rules()
         for resource, data, time_ns in self._runtime.host.wait_published(0):
-            topic, type_name, qos = self._outgoing[resource]
-            sample = Sample(topic, type_name, data, time_ns, qos)
-            self._keep(sample)
+            if (bound := self._outgoing.get(resource)) is None:
+                continue  # static transforms that the file binds to no topic
+            sample = Sample(bound.topic, bound.type_name, data, time_ns, bound.qos)
+            self._keep(in_virtual_time(sample))
             self._topics.publish(sample)
 
     def record(self) -> None:

@@ -11,6 +11,7 @@ from mauve_rt.model import message_class
 from mauve_rt.simulation.messages import serialize
 
 S = 1_000_000_000
+_TRANSFORMS = "tf2_msgs/msg/TFMessage"
 
 
 class Sample(NamedTuple):
@@ -50,6 +51,19 @@ class SimulatedTopics:
 def resolved(name: str, namespace: str) -> str:
     """A topic's full name."""
     return name if name.startswith("/") else f"{namespace.rstrip('/')}/{name}"
+
+
+def in_virtual_time(sample: Sample) -> Sample:
+    """A sample as it is recorded: a transform_tree stamps by the real clock, which no two runs share."""
+    if sample.type_name != _TRANSFORMS:
+        return sample
+    message = sample.message()
+    stamps = [each.header.stamp for each in message.transforms]
+    times_ns = [each.sec * S + each.nanosec for each in stamps]
+    ahead_ns = max(times_ns) - sample.time_ns
+    for each, time_ns in zip(message.transforms, times_ns, strict=True):
+        each.header.stamp = stamp(time_ns - ahead_ns)
+    return sample._replace(data=serialize(message))
 
 
 def stamp(time_ns: int) -> Any:

@@ -37,6 +37,11 @@ struct GridGeometry {
   bool contains(Cell cell) const noexcept {
     return cell.column >= 0 && cell.row >= 0 && cell.column < width && cell.row < height;
   }
+  bool contains(const Point& point) const noexcept {
+    const double column = (point.x - origin_x_m) / resolution_m;
+    const double row = (point.y - origin_y_m) / resolution_m;
+    return column >= 0.0 && row >= 0.0 && column < width && row < height;
+  }
   std::size_t index(Cell cell) const noexcept {
     return static_cast<std::size_t>(cell.row) * static_cast<std::size_t>(width) +
            static_cast<std::size_t>(cell.column);

@@ -3,6 +3,9 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+
+#include "mauve_rt/parts/transformed_read_port.hpp"
 
 #include "mauve_examples/model/guidance_core.hpp"
 #include "mauve_examples/occupancy_map.hpp"
@@ -27,9 +30,15 @@ class Guidance final : public GuidanceCore {
   bool configure_hook() override;
 
  private:
+  void read_goals();
+  bool read_operator_goal();
   void write_target();
 
   Pilot pilot_;
+  std::optional<mauve::TransformedReadPort<PoseStamped>> operator_goal_;  // in the frame of goals
+  mauve::time_ns_t operator_goal_ns_{0};                                  // when the last one came
+  mauve::time_ns_t has_path_ns_{0};  // when there was a path to that goal
+  bool is_operated_{false};          // on its way to that goal
   std::unique_ptr<Scan> scan_;
 };
 

@@ -21,6 +21,8 @@ class Pilot {
 
   /// Copies what has changed on the map: planning does not keep others from it. [rt]
   void read_map(const OccupancyGrid& map) noexcept;
+  /// The map's, also while nothing of it is known. [rt]
+  const GridGeometry& geometry() const noexcept { return geometry_; }
   /// Where to go; the same place again changes nothing. [rt]
   void set_goal(const Point& goal) noexcept;
   /// Judges the present path by what is seen and by the map as read. [rt]

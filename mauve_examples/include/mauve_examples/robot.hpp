@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// Robot: the simulated body. Velocity commands in, pose and scan out, 100 Hz; tells the other bodies where it is.
+// Robot: the simulated body. Velocity commands in, pose, scan and frames out, 100 Hz; tells the other bodies where it is.
 #pragma once
 
 #include <memory>
+
+#include "mauve_rt/data/transform_tree.hpp"
 
 #include "mauve_examples/map_file.hpp"
 #include "mauve_examples/model/robot_core.hpp"
@@ -29,6 +31,8 @@ class Robot final : public RobotCore {
  private:
   Twist command_in_force() const;
   void meet_others();
+  void set_frames();
+  void set_frame(mauve::SetTransform::Request& request, const mauve::Transform& transform);
 
   GridMap world_;
   Unicycle body_;
@@ -37,6 +41,11 @@ class Robot final : public RobotCore {
   std::unique_ptr<Scan> walls_;  // without robots: as before while this one stands
   Pose2D seen_from_;
   mauve::BoundedVector<RobotBody, kMaxOthers> others_;  // where they were when they last said so
+  Pose2D start_;                                        // the odometry's origin
+  mauve::SetTransform::Request odom_;                   // in the map
+  mauve::SetTransform::Request base_;                   // in the odometry's frame
+  mauve::SetTransform::Request scanner_;                // at the base
+  bool are_static_frames_set_{false};
   std::int64_t steps_{0};
   std::int64_t collisions_{0};
   std::uint32_t collision_mark_{0};

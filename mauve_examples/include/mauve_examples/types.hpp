@@ -11,12 +11,14 @@
 #include "mauve_rt/data/cdr.hpp"
 #include "mauve_rt/elements/types.hpp"
 
+#include "mauve_types/geometry_msgs/msg/pose_stamped.hpp"
 #include "mauve_types/mauve_msgs/msg/map_update.hpp"
 #include "mauve_types/mauve_msgs/msg/peer_message.hpp"
 #include "mauve_types/mauve_msgs/msg/robot_body.hpp"
 
 namespace mauve_examples {
 
+using mauve::msg::geometry_msgs::PoseStamped;
 using mauve::msg::mauve_msgs::Bid;
 using mauve::msg::mauve_msgs::MapTile;
 using mauve::msg::mauve_msgs::MapUpdate;

@@ -8,6 +8,8 @@ namespace mauve_examples {
 
 /// The same angle within (-pi, pi]. [rt]
 double wrap_angle(double angle_rad) noexcept;
+/// The pose as seen from another one of the same frame. [rt]
+Pose2D pose_from(const Pose2D& origin, const Pose2D& pose) noexcept;
 
 struct UnicycleLimits {
   double speed_mps{1.0};

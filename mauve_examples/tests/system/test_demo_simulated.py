@@ -6,11 +6,14 @@ import subprocess
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import pytest
 from bag_reading import messages, topics
 from bag_rules import assert_rosbag2_reads
 from demo_harness import Demo, Starter
 from rosbags.highlevel import AnyReader
+from scipy.spatial.transform import Rotation
 
 from mauve_rt.trace.reading.reader import open_trace
 
@@ -45,6 +48,16 @@ def contents(demo: Demo, robot: str) -> list[tuple[str, int, object]]:
             )
             for connection, time_ns, data in reader.messages()
         ]
+
+
+def timed(bag: Path, topic: str) -> dict[int, Any]:
+    """The messages of a topic by their times."""
+    with AnyReader([bag]) as reader:
+        connections = [connection for connection in reader.connections if connection.topic == topic]
+        return {
+            time_ns: reader.deserialize(data, connection.msgtype)
+            for connection, time_ns, data in reader.messages(connections)
+        }
 
 
 def figures(demo: Demo) -> dict[str, Any]:
@@ -96,7 +109,7 @@ def test_both_robots_swap_there_and_back_and_miss_nothing(mission: Demo):
 
 
 def test_the_bags_hold_what_those_of_the_real_demo_hold(mission: Demo):
-    own = ("pose", "goal", "done", "map_updates", "radio/out", "radio/in", "supervisor/decisions")
+    own = ("pose", "odometry", "goal", "done", "map_updates", "radio/out", "radio/in", "supervisor/decisions")
     executor = (
         "executor/state",
         "executor/events",
@@ -107,9 +120,49 @@ def test_the_bags_hold_what_those_of_the_real_demo_hold(mission: Demo):
     for robot in ROBOTS:
         bag = mission.out / "bag" / robot
         assert_rosbag2_reads(bag)
-        assert {*(f"/{robot}/{name}" for name in own + executor), "/radio/link"} <= topics(bag).keys()
+        assert {
+            *(f"/{robot}/{name}" for name in own + executor),
+            "/radio/link",
+            "/tf",
+            "/tf_static",
+        } <= topics(bag).keys()
         decisions = [one.decision for one in messages(bag, f"/{robot}/executor/decisions")]
         assert decisions[-6:] == ["condition_true", "do", "done", "condition_false", "undo", "done"]
+
+
+def matrix(transform: Any) -> npt.NDArray[np.float64]:
+    """Of a geometry_msgs/msg/Transform."""
+    found = np.eye(4)
+    at, turn = transform.translation, transform.rotation
+    found[:3, :3] = Rotation.from_quat([turn.x, turn.y, turn.z, turn.w]).as_matrix()
+    found[:3, 3] = at.x, at.y, at.z
+    return found
+
+
+def test_the_frames_are_those_of_the_poses(mission: Demo):
+    for robot in ROBOTS:
+        bag = mission.out / "bag" / robot
+        [fixed] = messages(bag, "/tf_static")
+        static = {
+            (each.header.frame_id, each.child_frame_id): matrix(each.transform) for each in fixed.transforms
+        }
+        assert static.keys() == {("map", f"{robot}/odom"), (f"{robot}/base", f"{robot}/scan")}
+        poses = timed(bag, f"/{robot}/pose")
+        moving = timed(bag, "/tf")
+        assert moving.keys() == poses.keys()
+        assert len(poses) > 1000
+        for time_ns, message in moving.items():
+            [base] = message.transforms
+            assert (base.header.frame_id, base.child_frame_id) == (f"{robot}/odom", f"{robot}/base")
+            stamp = base.header.stamp
+            assert stamp.sec * 1_000_000_000 + stamp.nanosec == time_ns
+            odom, scan = static["map", f"{robot}/odom"], static[f"{robot}/base", f"{robot}/scan"]
+            found = odom @ matrix(base.transform) @ scan
+            pose = poses[time_ns]
+            expected = np.eye(4)
+            expected[:3, :3] = Rotation.from_euler("z", pose.theta).as_matrix()
+            expected[:2, 3] = pose.x, pose.y
+            np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_the_components_kept_their_grids(mission: Demo):

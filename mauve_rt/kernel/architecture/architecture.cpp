@@ -554,9 +554,11 @@ std::unique_ptr<CoreBase> Architecture::make_core(const std::string& implementat
 bool Architecture::next_published(std::string& resource, std::vector<std::byte>& message,
                                   time_ns_t& time_ns) {
   for (const auto& published : resources()) {
-    if (!published->next_published(message, time_ns)) continue;
-    resource = published->name();
-    return true;
+    for (Resource* const side : {published.get(), published->static_side()}) {
+      if (side == nullptr || !side->next_published(message, time_ns)) continue;
+      resource = side->name();
+      return true;
+    }
   }
   return false;
 }

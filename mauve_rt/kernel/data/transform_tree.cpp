@@ -55,6 +55,7 @@ TransformTree::TransformTree(std::uint32_t frames, std::uint32_t history)
 
 void TransformTree::set_name(const std::string& name) {
   Resource::set_name(name);
+  static_side_.set_name(name + ".static");
   buffer_.mutex().set_trace_id(TraceNames::intern(name));
 }
 

@@ -18,12 +18,11 @@ from mauve_rt.errors import MauveError, TopicError
 from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
-from mauve_rt.model.schema import QosModel, ResourceModel, ServiceModel, TopicModel
+from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
 from mauve_rt.trace.bag.recorded import SentMessage
 
 MAX_MIRRORS = 64
 _MIRROR_DEPTH = 10
-_STATIC_DEPTH = 100  # as of tf2's listeners: each publisher's last message waits for who comes later
 _SIDES = {"publish": "publishes", "subscribe": "subscribes"}  # fields of ResourceInfo
 
 
@@ -325,9 +324,8 @@ def _topics(resource: ResourceModel) -> Iterator[tuple[TopicModel, bool]]:
     """The topics that a resource is bound to, and whether one is that of its static transforms."""
     if resource.topic is None:
         return
-    if static_topic := resource.parameter("static_topic"):
-        qos = QosModel(profile="transient_local", depth=_STATIC_DEPTH)
-        yield TopicModel(name=static_topic, direction=resource.topic.direction, qos=qos), True
+    if resource.static_topic is not None:
+        yield resource.static_topic, True
     yield resource.topic, False
 
 

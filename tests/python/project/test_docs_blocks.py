@@ -101,6 +101,10 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
     "docs/howto/launch_files.md": {
         "def generate_launch_description": (f"{HOWTO}the_launch_file_of_the_page_gives_arguments_there_are",),
     },
+    "docs/howto/look_up_frames.md": {
+        "mauve check wrong.yaml": (f"{HOWTO}a_pose_in_another_frame_is_refused_as_the_page_says",),
+        "component 'control'": (f"{HOWTO}a_pose_in_another_frame_is_refused_as_the_page_says",),
+    },
     "docs/howto/operate.md": {
         "mauve list /robot_1/executor": (
             f"{README}every_command_is_one_that_mauve_takes",

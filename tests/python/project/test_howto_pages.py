@@ -63,6 +63,20 @@ def test_the_commands_that_find_an_overrun_print_what_it_shows(
     assert checked == 3
 
 
+def test_a_pose_in_another_frame_is_refused_as_the_page_says(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "install").symlink_to(INSTALLED)
+    commands, shown = _blocks("look_up_frames")
+    edit, check = commands.text.splitlines()
+    subprocess.run(["sh", "-ec", edit], check=True, timeout=60)
+    assert main(shlex.split(check)[1:]) == 2
+    place, _, refusal = capsys.readouterr().err.partition(" component ")
+    assert place.startswith("wrong.yaml:"), place
+    assert f"component {refusal}" == shown.text.strip() + "\n"
+
+
 def test_systemd_knows_each_line_of_the_units(tmp_path: Path) -> None:
     verify = shutil.which("systemd-analyze")
     if verify is None:

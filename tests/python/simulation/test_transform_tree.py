@@ -77,6 +77,12 @@ def test_outcomes_are_those_of_the_message(running: Running, log: list[Execution
     assert (asked[0].outcome, asked[0].frame) == (TransformOutcome.UNKNOWN_FRAME, "moon")
 
 
+def test_a_request_port_takes_the_name_of_a_service():
+    assert request_port("mauve_msgs/srv/SetTransform").service is SetTransform
+    with pytest.raises(TypeError, match="found 'mauve_msgs/srv/Nothing'"):
+        request_port("mauve_msgs/srv/Nothing")
+
+
 def test_a_request_port_takes_its_own_service_alone():
     with Stage() as stage:
         stage.add("look", LookShell, IdleCore, ActFsm)
@@ -85,7 +91,7 @@ def test_a_request_port_takes_its_own_service_alone():
             stage.architecture.connect("look", "lookup", "frames", "set")
         assert refused.value.code == "type_mismatch"
     with pytest.raises(TypeError, match="expected a class of a ROS service"):
-        request_port("mauve_msgs/srv/SetTransform")
+        request_port(LookupTransform.Request)
 
 
 def test_sizes_are_checked():
