@@ -13,13 +13,14 @@ What is loaded for a name that comes by request, and where the name has to be li
 | type of a service                  | rosidl_interfaces                   | package.srv, type supports |
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from mauve_rt._kernel import (
     ComponentDescription,
+    PortDescription,
     PropertyDescription,
     ResourceDescription,
     ShellDescription,
@@ -32,11 +33,11 @@ from mauve_rt.errors import ArchitectureFileError, MauveError, one_line
 from mauve_rt.file_schema.words import did_you_mean, shown, some
 from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
+from mauve_rt.model.bumpless import read_bumpless
 from mauve_rt.model.checks import Checks, property_mismatch
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
-from mauve_rt.model.bumpless import read_bumpless
 from mauve_rt.model.probation import read_probation
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import ComponentModel, PropertyValue, ResourceModel
@@ -128,7 +129,8 @@ class Plan:
     def _change_component(self, step: Step, kind: StepKind) -> None:
         component, name = self._component(step), step.target
         if kind.value == "promotion" and isinstance(self.transaction, Transaction):
-            return self._promote(step)
+            self._promote(step)
+            return
         self.transaction.add(step.kind, name, step.name, _kernel_value(step, kind, component))
         if kind.removes:
             del self._sketches[name]

@@ -28,7 +28,8 @@ class Bumpless:
     def options(self) -> BumplessOptions:
         """What the kernel takes."""
         outputs = [
-            GreatestStep(*output.partition(".")[::2], step=float(step)) for output, step in self.outputs.items()
+            GreatestStep(*output.partition(".")[::2], step=float(step))
+            for output, step in self.outputs.items()
         ]
         return BumplessOptions(
             outputs, within_ns=round(self.within_s * 1e9), budget_ns=round(self.budget_us * 1e3)

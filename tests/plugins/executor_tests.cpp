@@ -85,6 +85,15 @@ struct SetBool {
   };
 };
 
+struct OutputStep {
+  mauve::BoundedString<64> output;
+  double greatest{};
+  double difference{};
+  double least{};
+  std::int64_t least_instant_ns{};
+  double step{};
+};
+
 struct StepReport {
   mauve::BoundedString<64> step;
   mauve::BoundedString<32> component;
@@ -100,6 +109,7 @@ struct StepReport {
   std::int64_t release_ns{};
   mauve::BoundedVector<mauve::BoundedString<64>, 4> taken;
   mauve::BoundedVector<mauve::BoundedString<64>, 4> left;
+  mauve::BoundedVector<OutputStep, 4> outputs;
 };
 
 struct Stop {
@@ -146,9 +156,11 @@ MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", s
 MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
 MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
            requested_by, cause, component, timeout_s, force)
+MAUVE_TYPE(executor_tests::OutputStep, "mauve_msgs/msg/OutputStep", output, greatest, difference, least,
+           least_instant_ns, step)
 MAUVE_TYPE(executor_tests::StepReport, "mauve_msgs/msg/StepReport", step, component, prepare_ns, blackout_ns,
            missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark, instant_ns,
-           release_ns, taken, left)
+           release_ns, taken, left, outputs)
 MAUVE_TYPE(executor_tests::Stop::Response, "mauve_msgs/srv/Stop_Response", success, code, message,
            instance_id, revision, report)
 MAUVE_CALL_TYPE(executor_tests::Stop, "mauve_msgs/srv/Stop")

@@ -69,6 +69,15 @@ struct Trigger {
   using Response = TriggerResponse;
 };
 
+struct OutputStep {
+  mauve::BoundedString<16> output;
+  double greatest{};
+  double difference{};
+  double least{};
+  std::int64_t least_instant_ns{};
+  double step{};
+};
+
 /// As mauve_msgs/msg/StepReport, the names with a word more where that says more, shorter strings.
 struct Report {
   mauve::BoundedString<16> step;
@@ -85,6 +94,7 @@ struct Report {
   std::int64_t release_ns{};
   mauve::BoundedVector<mauve::BoundedString<64>, 4> taken;
   mauve::BoundedVector<mauve::BoundedString<64>, 4> left;
+  mauve::BoundedVector<OutputStep, 4> outputs;
 };
 
 struct Large {
@@ -106,9 +116,11 @@ MAUVE_TYPE(misfits::Covariance, "geometry_msgs/msg/AccelWithCovariance", accel, 
 MAUVE_TYPE(misfits::TriggerRequest, "std_srvs/srv/Trigger_Request")
 MAUVE_TYPE(misfits::TriggerResponse, "std_srvs/srv/Trigger_Response", message, success)
 MAUVE_CALL_TYPE(misfits::Trigger, "std_srvs/srv/Trigger")
+MAUVE_TYPE(misfits::OutputStep, "mauve_msgs/msg/OutputStep", output, greatest, difference, least,
+           least_instant_ns, step)
 MAUVE_TYPE(misfits::Report, "mauve_msgs/msg/StepReport", step, component_name, prepare_ns, blackout_ns,
            missed_releases, phase_nominal_ns, phase_actual_ns, from_core, to_core, remark, instant_ns,
-           release_ns, taken, left)
+           release_ns, taken, left, outputs)
 MAUVE_TYPE(misfits::Large, "misfits/Large", data)
 
 namespace misfits {

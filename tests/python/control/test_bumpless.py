@@ -72,9 +72,7 @@ def test_the_candidate_of_a_shadow_is_promoted_where_it_is_near(world: World) ->
 
 def test_a_fresh_candidate_begins_with_its_own_state(world: World) -> None:
     world.run(50)
-    assert world.ask(
-        Step("shadow", "loop", "reload_tests/Other", "{budget_us: 50000, fresh: true}")
-    ).success
+    assert world.ask(Step("shadow", "loop", "reload_tests/Other", "{budget_us: 50000, fresh: true}")).success
     far = world.ask(Step("promote", "loop", "", "{bumpless: {outputs: {sum.data: 0.5}, within_s: 0.05}}"))
     assert far.code == Code.TIMEOUT
     before = world.sum()[0]
@@ -127,6 +125,9 @@ def test_values_of_a_promotion_are_checked(world: World) -> None:
 
 def test_defaults() -> None:
     options = read_bumpless({"outputs": {"a.b.c": 1, "d": 0}}).options()
-    assert [(each.port, each.field, each.step) for each in options.outputs] == [("a", "b.c", 1.0), ("d", "", 0.0)]
+    assert [(each.port, each.field, each.step) for each in options.outputs] == [
+        ("a", "b.c", 1.0),
+        ("d", "", 0.0),
+    ]
     assert (options.within_ns, options.budget_ns) == (2_000_000_000, 0)
     assert not math.isnan(options.outputs[0].step)

@@ -80,8 +80,8 @@ def _runs(group: int) -> bool:
 def test_what_a_library_registers(tutorials: Path) -> None:
     answer = try_plugins([tutorials], [], generation=2)
     shell = "mauve_examples/MetronomeShell"
-    assert answer["names"]["shell"] == [shell]
-    assert answer["names"]["core"] == ["mauve_examples/Accelerando", "mauve_examples/Metronome"]
+    assert shell in answer["names"]["shell"]
+    assert {"mauve_examples/Accelerando", "mauve_examples/Metronome"} <= {*answer["names"]["core"]}
     size, ports, properties = answer["shells"][shell]
     assert size > 0
     assert ports == [["beat", "write", "std_msgs/msg/Float64"]]

@@ -56,7 +56,7 @@ def resource(name: str, what: str) -> tuple[str, str]:
 
 
 MOVE, CONTROL = "Move: {wcet_ns: 200000}", "Control: {wcet_ns: 600000}"
-GOAL = "goal: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: goal, direction: "
+GOAL = "topic: {name: goal, direction: "
 CASES: dict[str, tuple[list[tuple[str, str]], str, str]] = {
     "optional port": (
         [("  - [control.scan, scan.read]\n", "")],

@@ -21,7 +21,7 @@ from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import write_report
 
 TYPES = get_typestore(Stores.EMPTY)
-for name in ("ShadowOutput", "Shadow"):
+for name in ("ShadowOutput", "OutputStep", "Shadow"):
     text = (ROOT / "mauve_msgs" / "msg" / f"{name}.msg").read_text(encoding="utf-8")
     TYPES.register(get_types_from_msg(text, f"mauve_msgs/msg/{name}"))
 RUNNING, ENDED, FAULTED = 0, 1, 2
@@ -48,6 +48,9 @@ def shadow(component: str, verdict: int, compared: int, *, begin_ms: int = 30, *
         lag=-1,
     )
     other = replace(output, field="linear.y", maximum=float("inf"), nan=0, has_lag=False, lag=0)
+    step = TYPES.types["mauve_msgs/msg/OutputStep"](
+        output="cmd.linear.x", greatest=0.5, difference=0.25, least=0.125, least_instant_ns=1, step=float("nan")
+    )
     message = TYPES.types[SHADOW_TYPE](
         component=component,
         core="my_robot/Pid2",
@@ -65,6 +68,7 @@ def shadow(component: str, verdict: int, compared: int, *, begin_ms: int = 30, *
         budget_ns=50_000,
         largest_execution_ns=61_000,
         outputs=[output, other],
+        steps=[step],
     )
     return bytes(TYPES.serialize_cdr(replace(message, **told), SHADOW_TYPE))
 
