@@ -57,6 +57,11 @@ TaskSettings task_settings(const std::string& component, const py::kwargs& given
       check_states(settings.states, component);
       continue;
     }
+    if (name == "max_slew") {
+      settings.max_slew = value.cast<MaxSlew>();
+      check_max_slew(settings.max_slew, component);
+      continue;
+    }
     const auto* setting = std::find_if(kTaskSettings.begin(), kTaskSettings.end(),
                                        [&name](const TaskSetting& each) { return each.name == name; });
     if (setting == kTaskSettings.end())
