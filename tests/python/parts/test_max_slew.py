@@ -1,0 +1,86 @@
+"""max_slew of components with parts in Python: of messages that a library has a struct of."""
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+from python_parts import ActFsm, Stage
+from std_msgs.msg import Float64
+
+from mauve_rt.api import Core, MauveError, RingBuffer, Shell, Simulation, read_resource, write_port
+from mauve_rt.model.plugin_index import PluginIndex
+from mauve_rt.model.plugins import PluginLoader
+
+
+class TorqueShell(Shell):
+    torque = write_port(Float64, optional=True)
+    pose = write_port(PoseStamped, optional=True)
+
+
+class TorqueCore(Core[TorqueShell]):
+    """Writes 0 once, then 1 at each release."""
+
+    def configure(self) -> None:
+        self.target = 0.0
+
+    def act(self) -> None:
+        self.shell.torque.write(Float64(data=self.target))
+        self.target = 1.0
+
+
+@pytest.fixture
+def slewed(built: Stage) -> Stage:
+    # Its library has a struct of Float64: before Python makes a port of the type.
+    PluginLoader(built.registry, PluginIndex.installed()).require("core", "mauve_rt/TwistRelay")
+    built.architecture.add_component(
+        "drive", TorqueShell, TorqueCore, ActFsm, max_slew={"torque.data": 50.0}
+    )
+    built.share("torques", RingBuffer(Float64, 1000), "drive.torque.write")
+    return built
+
+
+def written(host: object, count: int) -> list[float]:
+    """The first values of the output; the buffer gives each to one reader."""
+    return [read_resource(host, "torques", Float64).value.data for _ in range(count)]  # type: ignore[arg-type]
+
+
+def test_a_python_core_moves_its_output_no_faster(slewed: Stage) -> None:
+    slewed.deploy()
+    slewed.until(lambda: slewed.describe("drive").slew_limits[0].limited >= 3)
+    values = written(slewed.deployer, 3)
+    assert values[0] == 0.0
+    assert values[1] >= 0.1 - 1e-9, "a step of 2 ms, or of more where releases were skipped"
+    assert values == sorted(values)
+    (record,) = slewed.describe("drive").slew_limits
+    assert (record.output, record.max_slew, record.not_limited) == ("torque.data", 50.0, 0)
+
+
+def test_a_python_core_moves_its_output_no_faster_in_virtual_time(slewed: Stage) -> None:
+    slewed.architecture.configure()
+    simulation = Simulation()
+    host = simulation.add(slewed.architecture)
+    simulation.deploy()
+    simulation.run_until(simulation.epoch_ns() + 8_000_000)
+    assert written(host, 4) == pytest.approx([0.0, 0.1, 0.2, 0.3])
+    host.stop("drive")
+    assert slewed.describe("drive").state == "STOPPING"
+    simulation.run_until(simulation.now_ns() + 20_000_000)
+    assert slewed.describe("drive").state == "STOPPED"
+    last = [0.4, 0.3, 0.2, 0.1, 0.0]  # it was released at 8 ms
+    assert written(host, 5) == pytest.approx(last)
+    simulation.shutdown()
+
+
+def test_a_message_without_a_struct_is_refused(built: Stage) -> None:
+    with pytest.raises(MauveError, match=r"max_slew pose: .*PoseStamped in serialized; let a plug-in") as caught:
+        built.architecture.add_component(
+            "drive", TorqueShell, TorqueCore, ActFsm, max_slew={"pose.pose.position.x": 1.0}
+        )
+    assert caught.value.code == "invalid_argument"
+    assert caught.value.component == "drive"
+
+
+@pytest.mark.parametrize("per_second", [0.0, -1.0, float("nan"), float("inf")])
+def test_what_is_no_change_per_second_is_refused(built: Stage, per_second: float) -> None:
+    with pytest.raises(MauveError, match="max_slew is no change per second: expected a finite number above 0"):
+        built.architecture.add_component(
+            "drive", TorqueShell, TorqueCore, ActFsm, max_slew={"torque.data": per_second}
+        )
