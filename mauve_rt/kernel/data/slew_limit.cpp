@@ -62,8 +62,7 @@ SlewLimit::SlewLimit(std::shared_ptr<SlewedOutput> output, std::vector<NumberPla
 void SlewLimit::take_stop() noexcept {
   if (output_->stopped_ns_.load(kLone) == SlewedOutput::kNone) return;
   // acquire: a write that goes on from that value finds the port closed after it, and the value of the stop is written once more
-  const time_ns_t stopped_ns =
-      output_->stopped_ns_.exchange(SlewedOutput::kNone, std::memory_order_acq_rel);
+  const time_ns_t stopped_ns = output_->stopped_ns_.exchange(SlewedOutput::kNone, std::memory_order_acq_rel);
   for (std::size_t i = 0; i < places_.size(); ++i) {
     output_->numbers_[i].last.store(places_[i].of(zero_), kLone);
     count_from(output_->numbers_[i], stopped_ns);

@@ -434,7 +434,8 @@ bool Task::stop(time_ns_t timeout_ns, bool force, std::uint64_t expected_revisio
     if (!is_going(state_.load(std::memory_order_acquire))) break;
     if (force && time_out_unless_waiting()) return true;
     if (is_ramping_.load(std::memory_order_relaxed)) {  // relaxed: it words a message
-      throw Error(ErrorCode::timeout, "max_slew still moves the outputs to the values of the stop, which stays pending",
+      throw Error(ErrorCode::timeout,
+                  "max_slew still moves the outputs to the values of the stop, which stays pending",
                   {.component = name_,
                    .expected = "the end of that within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
                    .remedy = "give the stop more time; a stop by force writes the values at once"});

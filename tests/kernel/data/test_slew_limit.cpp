@@ -221,7 +221,8 @@ TEST(SlewLimitOf, NoStepIsLongerThanAllowed) {
     Limited<Axis> axis{{{"torque", slew}, {"count", slew}, {"angle", slew}}};
     double ms = 0;
     const double base = std::pow(10.0, below(8.0)) - 1;
-    Axis last{.torque = base, .count = static_cast<std::int32_t>(base / 10), .angle = static_cast<float>(base)};
+    Axis last{
+        .torque = base, .count = static_cast<std::int32_t>(base / 10), .angle = static_cast<float>(base)};
     axis.port.write(last);
     const Axis first = last;
     const auto moved = [](const Axis& from, const Axis& to) {  // in the order of the paths
@@ -233,7 +234,8 @@ TEST(SlewLimitOf, NoStepIsLongerThanAllowed) {
       axis.at_ms(ms);
       std::array<double, 3> steps{};
       for (std::size_t at = 0; at < steps.size(); ++at)
-        steps[at] = slew * (ms / 1e3 - static_cast<double>(axis.number(at).since_ns.load()) / 1e9) + 1e-12 * slew;
+        steps[at] =
+            slew * (ms / 1e3 - static_cast<double>(axis.number(at).since_ns.load()) / 1e9) + 1e-12 * slew;
       const double wanted = base + (below(2.0) - 1.0) * std::pow(10.0, below(8.0));
       axis.port.write({.torque = below(20) < 1 ? kNan : wanted,
                        .count = static_cast<std::int32_t>(wanted / 10),

@@ -71,9 +71,7 @@ class MaxSlew : public OnBothHosts<Way> {
     }
     return found;
   }
-  void stop_by_force() {
-    (*this->host).stop("c", StopOptions{.timeout_ns = s_to_ns(10), .force = true});
-  }
+  void stop_by_force() { (*this->host).stop("c", StopOptions{.timeout_ns = s_to_ns(10), .force = true}); }
 
   RingBuffer<Number>* sink{nullptr};
   ReaderState reader;
@@ -121,7 +119,8 @@ TYPED_TEST(MaxSlew, AnotherShellGoesOnFromTheLastValue) {
   this->deploy();
   this->run_up(component);
   Transaction change;
-  change.replace_shell("c", std::make_unique<TestShell>()).replace_core("c", std::make_unique<TargetCore>(-1.0));
+  change.replace_shell("c", std::make_unique<TestShell>())
+      .replace_core("c", std::make_unique<TargetCore>(-1.0));
   this->host.commit(std::move(change));
   this->wait_value(-1.0);
   EXPECT_EQ(0, this->jumps());

@@ -396,7 +396,8 @@ class WritePort final : public PortBase {
   BiasedMutex::Seat* seat_{nullptr};
   OutputOptions output_;
   T zero_{};  // kept here: large types do not belong on a small stack
-  std::unique_ptr<T> limited_;  // a copy of the value that is written, with its numbers limited
+  /// A copy of the value that is written, with its numbers limited.
+  std::unique_ptr<T> limited_;
 };
 
 template <typename Signature>

@@ -18,17 +18,17 @@ namespace mauve {
 
 /// One number of an output: the value that was written last, and how far it may move.
 struct SlewedNumber {
-  std::string path;  // within the message: linear.x
+  std::string path;      // within the message: linear.x
   double max_slew{0.0};  // units of the number per second
 
   Atomic<double> last{0.0};
-  Atomic<time_ns_t> since_ns{0};        // the time that a step counts from
-  Atomic<std::uint64_t> limited{0};     // writes in which it was written otherwise than the component asked for
-  Atomic<std::uint64_t> not_limited{0};  // values of a stop that were written at once, further away than allowed
+  Atomic<time_ns_t> since_ns{0};     // the time that a step counts from
+  Atomic<std::uint64_t> limited{0};  // writes in which it was written otherwise than the component asked for
+  Atomic<std::uint64_t> not_limited{0};  // values of a stop that were further away, and written at once
 
   double next{0.0};  // of the write under way
   bool is_limited{false};
-  bool keeps_time{false};  // the step was too small for a number of its type: the next one has the time of both
+  bool keeps_time{false};  // the step was too small for the number's type: the next one has the time of both
 };
 
 /// The limited numbers of one output of a component. They survive the port: the port of a new shell goes on from there.

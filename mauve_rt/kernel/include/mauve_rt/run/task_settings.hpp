@@ -42,7 +42,7 @@ struct TaskSettings {
   LogLevel log_level{LogLevel::info};  // its log lines below are not kept; what it begins with
   bool enforce_wcet{false};  // wcet_ns of an execution state is a budget of CPU time; a fault above it
   std::vector<DeclaredState> states{};  // of the fsm's execution states
-  MaxSlew max_slew{};                   // "command.torque": greatest change per second of a number of an output
+  MaxSlew max_slew{};  // "command.torque": greatest change per second of a number of an output
   bool operator==(const TaskSettings&) const = default;
 };
 
