@@ -58,7 +58,8 @@ TaskSettings task_settings(const std::string& component, const py::kwargs& given
       continue;
     }
     if (name == "max_slew") {
-      settings.max_slew = value.cast<MaxSlew>();
+      const auto by_output = value.cast<std::map<std::string, double>>();
+      settings.max_slew.assign(by_output.begin(), by_output.end());
       check_max_slew(settings.max_slew, component);
       continue;
     }

@@ -2,6 +2,7 @@
 #include "mauve_rt/parts/slewed_outputs.hpp"
 
 #include <cmath>
+#include <set>
 
 #include "mauve_rt/base/error.hpp"
 
@@ -10,7 +11,12 @@
 namespace mauve {
 
 void check_max_slew(const MaxSlew& max_slew, const std::string& component) {
+  std::set<std::string> named;
   for (const auto& [output, per_second] : max_slew) {
+    if (!named.insert(output).second) {
+      throw Error(ErrorCode::duplicate_name, "max_slew names a number twice",
+                  {.component = component, .element = "max_slew " + output, .remedy = "remove one of them"});
+    }
     if (const std::size_t dot = output.find('.'); dot == 0 || dot >= output.size() - 1) {
       throw Error(ErrorCode::invalid_argument, "max_slew names no number of an output",
                   {.component = component,
@@ -32,7 +38,7 @@ void check_max_slew(const MaxSlew& max_slew, const std::string& component) {
 
 SlewedOutputs::SlewedOutputs(const MaxSlew& max_slew, const std::string& component) {
   check_max_slew(max_slew, component);
-  std::map<std::string, MaxSlew> paths;
+  std::map<std::string, std::map<std::string, double>> paths;
   for (const auto& [output, per_second] : max_slew) {
     const std::size_t dot = output.find('.');
     paths[output.substr(0, dot)].emplace(output.substr(dot + 1), per_second);

@@ -156,7 +156,9 @@ TYPED_TEST(MaxSlew, AStopMovesTheOutputToItsZero) {
   EXPECT_EQ(0.0, this->newest());
   EXPECT_EQ(0, this->jumps());
   EXPECT_EQ(0U, this->record(component).not_limited);
-  if constexpr (TestFixture::is_virtual) EXPECT_EQ(releases, component.task().statistics().releases);
+  if constexpr (TestFixture::is_virtual) {
+    EXPECT_EQ(releases, component.task().statistics().releases);
+  }
 }
 
 TYPED_TEST(MaxSlew, AStartGoesOnFromTheZeroHoweverLongItWasStopped) {
@@ -294,6 +296,7 @@ TEST(MaxSlewSetting, SaysWhatIsWrong) {
   expect("output.value", -1.0, out_of_range, "a finite number above 0");
   expect("output.value", kNan, out_of_range, "a finite number above 0");
   expect("output.value", std::numeric_limits<double>::infinity(), out_of_range, "a finite number above 0");
+  EXPECT_EQ(duplicate_name, refusal({{"output.value", 1.0}, {"output.value", 2.0}}).first);
 }
 
 }  // namespace mauve::testing::test_max_slew

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/data/slew_limit.hpp"
@@ -13,10 +14,10 @@
 
 namespace mauve {
 
-/// "command.torque" and the units of the number per second.
-using MaxSlew = std::map<std::string, double>;
+/// "command.torque" and the units of the number per second. A vector: settings may be constants of a program.
+using MaxSlew = std::vector<std::pair<std::string, double>>;
 
-/// Throws Error (invalid_argument, out_of_range): no port and path, or no finite number above 0. [non-rt]
+/// Throws Error (invalid_argument, out_of_range, duplicate_name): no port and path, no finite number above 0, named twice. [non-rt]
 void check_max_slew(const MaxSlew& max_slew, const std::string& component);
 
 /// A limited number as anyone may see it.
