@@ -488,7 +488,12 @@ BAD = {
         "sett: map",
         "component 'sink' has no port 'sett' that reads or writes values; did you mean set?",
     ),
-    "max_slew of no number": ("priority: 40", "max_slew: {count: 1.0}", "count", "a write port, a dot and the"),
+    "max_slew of no number": (
+        "priority: 40",
+        "max_slew: {count: 1.0}",
+        "count",
+        "a write port, a dot and the",
+    ),
     "max_slew of no port": (
         "priority: 40",
         "max_slew: {cuont.data: 1.0}",
