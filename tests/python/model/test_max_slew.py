@@ -9,8 +9,7 @@ from mauve_rt._kernel import Architecture, PluginRegistry, Transaction
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import build, configure, load_architecture
 from mauve_rt.model.build import add_component_step
-from mauve_rt.model.plugin_index import PluginIndex
-from mauve_rt.model.plugins import PluginLoader
+from mauve_rt.model.plugins import PluginIndex, PluginLoader
 
 REGISTRY = PluginRegistry()
 
