@@ -238,7 +238,7 @@ void PortBase::limit_slew(std::shared_ptr<SlewedOutput> output) {
              "a field of " + type_ + " that is a number, not in a text or a list whose length changes",
              number.path, "name the field of a number, such as twist.linear.x or torque[0]");
     }
-    places.push_back(*place);
+    places.push_back(place.value_or(NumberPlace{}));
   }
   slew_limit_ = std::make_unique<SlewLimit>(std::move(output), std::move(places), zero);
   set_special(kLimited, kLimited);
