@@ -175,6 +175,8 @@ bool Task::ramps_down() noexcept {
   if (period_ns == 0 || (control_.load(std::memory_order_acquire) & (kExit | kAtOnce)) != 0) return false;
   const auto& ports = shell()->ports();
   const time_ns_t instant_ns = machine_.clock_ns();
+  // As at a start: the time without a write before the stop is no time to move in.
+  for (const auto& port : ports) port->resume_slew(later_by(instant_ns, -period_ns));
   const auto is_beyond = [&](const auto& port) { return port->ramps_down_at(instant_ns); };
   if (std::none_of(ports.begin(), ports.end(), is_beyond)) return false;
   control_.fetch_and(~kCommit, std::memory_order_acq_rel);

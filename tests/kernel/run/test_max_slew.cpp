@@ -19,10 +19,11 @@ struct Written {
 struct TargetCore : TestCore {
   explicit TargetCore(double first = 0.0) : target(first) {}
   void act() override {
-    exposed_shell().output.write({target.load()});
+    if (writes) exposed_shell().output.write({target.load()});
     TestCore::act();
   }
   std::atomic<double> target;
+  std::atomic<bool> writes{true};
 };
 
 template <typename Way>
@@ -159,6 +160,23 @@ TYPED_TEST(MaxSlew, AStopMovesTheOutputToItsZero) {
   if constexpr (TestFixture::is_virtual) {
     EXPECT_EQ(releases, component.task().statistics().releases);
   }
+}
+
+TYPED_TEST(MaxSlew, AStopBeginsWithOneStepHoweverLongNothingWasWritten) {
+  Component& component = this->add_slewed();
+  this->deploy();
+  this->run_up(component);
+  this->core(component).writes = false;
+  const int runs = this->core(component).runs;
+  this->wait_runs(component, runs + 50);
+  this->collect();
+  const std::size_t before = this->all.size();
+  this->host.stop("c");
+  this->wait_state(component, ComponentState::stopped);
+  EXPECT_EQ(0.0, this->newest());
+  ASSERT_GT(this->all.size(), before);
+  EXPECT_DOUBLE_EQ(0.9, this->all[before].value);
+  EXPECT_EQ(0U, this->record(component).not_limited);
 }
 
 TYPED_TEST(MaxSlew, AStartGoesOnFromTheZeroHoweverLongItWasStopped) {
