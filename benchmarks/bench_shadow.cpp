@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // What a shadow costs the thread of the live component: the taps of its ports, the capture of a release, and the CPU time of a
-// whole release. Next to the shadow the same with a watch on the output, as of a core on probation.
+// whole release. Next to the shadow the same with a watch on the output, as of a core on probation, and with a max_slew that acts.
 //   bench_shadow [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0] [--turns 10] [--releases 50]
 // Prints {"read_ps": [...], "tapped_read_ps": [...], "write_ps": [...], "tapped_write_ps": [...], "watched_write_ps": [...],
-// "capture_ps": [...]} in picoseconds a call, of values of 16 bytes. A deployed 1 kHz component that reads and writes once a
+// "limited_write_ps": [...], "capture_ps": [...]} in picoseconds a call, of values of 16 bytes. A deployed 1 kHz component that reads and writes once a
 // release follows, with {"plain_ns": [...], "shadowed_ns": [...], "waking_ns": [...], "probation_ns": [...]}: CPU time of the
 // component's thread from one release to the next. "waking" has no shadow, and wakes a sleeping ordinary thread in each release.
 // "releases" and "compared": of the releases with a shadow, those that the candidate executed.
@@ -97,14 +97,18 @@ void measure_ports(const bench::Options& options, bench::JsonLine& line) {
   Pipe plain;
   Pipe tapped;
   Pipe watched;
+  Pipe limited;
   OneLimit limit(watched.shell.output);
   tapped.capture->attach(0);
   watched.shell.output.watch(limit);
+  limited.shell.output.limit_slew(
+      std::make_shared<mauve::SlewedOutput>(std::map<std::string, double>{{"first", 1.0}}));
   micro.compare(line, {{"read", [&](std::int64_t calls) { plain.read(calls); }},
                        {"tapped_read", [&](std::int64_t calls) { tapped.read(calls); }}});
   micro.compare(line, {{"write", [&](std::int64_t calls) { plain.write(calls); }},
                        {"tapped_write", [&](std::int64_t calls) { tapped.write(calls); }},
-                       {"watched_write", [&](std::int64_t calls) { watched.write(calls); }}});
+                       {"watched_write", [&](std::int64_t calls) { watched.write(calls); }},
+                       {"limited_write", [&](std::int64_t calls) { limited.write(calls); }}});
   micro.compare(line, {{"capture", [&](std::int64_t calls) { tapped.end_releases(calls); }}});
   watched.shell.output.unwatch(limit);
 }

@@ -155,7 +155,11 @@ def shadow_rows(settings: Settings) -> Iterator[Row]:
     rounds = _rounds("bench_shadow", settings)
     beside = "the same port without"
     sides = {"tapped_read": "read, with a shadow's tap", "tapped_write": "write, with a shadow's tap"}
-    for name, what in (sides | {"watched_write": "write, with an output limit of a probation"}).items():
+    sides |= {
+        "watched_write": "write, with an output limit of a probation",
+        "limited_write": "write, with a max_slew that limits it",
+    }
+    for name, what in sides.items():
         pairs = _block_pairs(rounds, name, name.partition("_")[2])
         yield compared(f"port of a SharedData, 16 B, {what}", pairs, unit="ns", beside=beside)
     what = "copy of a release with two ports of 16 B for its shadow, without the wake-up"

@@ -212,6 +212,7 @@ def settings_types(module: ModuleType) -> list[str]:
         '    """How a component is run. What is left out has its default: see TASK_SETTINGS."""',
         *settings,
         "    states: dict[str, StateTimes]  # of the fsm's execution states, by name",
+        "    max_slew: dict[str, float]  # by 'command.torque': greatest change per second of the number",
         "",
         "@type_check_only",
         "class StateTimes(TypedDict, total=False):",

@@ -152,7 +152,8 @@ ComponentDescription describe_component(Component& component) {
           .state_age = age,
           .deadline_ns = task.settings().deadline_ns,
           .overrun = std::string(kOverrunPolicies[static_cast<std::size_t>(task.settings().overrun)]),
-          .states = component.described_states()};
+          .states = component.described_states(),
+          .slew_limits = component.slews()};
 }
 
 RecentMaxima take_recent_maxima(const Component& component) {
@@ -322,6 +323,14 @@ void bind_descriptions(py::module_& module) {
                     "Of a core that declares times of other methods: wcet_ns is 0.")
       .def_readonly("wcet_enforced", &S::wcet_enforced,
                     "An execution that uses more CPU time than wcet_ns faults its component.");
+  py::class_<SlewRecord>(module, "SlewRecord",
+                         "A number with a max_slew; fields as mauve_msgs/msg/SlewLimit.")
+      .def_readonly("output", &SlewRecord::output, "PORT.PATH, such as command.torque.")
+      .def_readonly("max_slew", &SlewRecord::max_slew, "Units of the number per second.")
+      .def_readonly("limited", &SlewRecord::limited,
+                    "Writes in which the kernel wrote another value than the component asked for.")
+      .def_readonly("not_limited", &SlewRecord::not_limited,
+                    "Values of a stop that were written at once, further away than max_slew allows.");
   using C = ComponentDescription;
   py::class_<C>(module, "ComponentDescription", "A snapshot; fields as mauve_msgs/msg/ComponentInfo.")
       .def_readonly("name", &C::name)
@@ -357,6 +366,7 @@ void bind_descriptions(py::module_& module) {
       .def_readonly("deadline_ns", &C::deadline_ns, "Declared; 0: the next instant.")
       .def_readonly("overrun", &C::overrun, "'skip', 'catch_up', 'fault'.")
       .def_readonly("states", &C::states, "Of the fsm.")
+      .def_readonly("slew_limits", &C::slew_limits, "Of the numbers of its outputs that have a max_slew.")
       .def_property_readonly(
           "state_age_ns", [](const C& self) { return self.state_age.age_ns; },
           "How long it has been executing current_state; of a wait: how long past its pending instant; 0: "

@@ -19,7 +19,7 @@ Attributes:
     STOP_TIMEOUT_NS: How long a state may go on after a stop of all components, before its component is given up.
     TRANSFORM_OUTCOMES: The outcomes of a set or lookup of a transform in words, by the numbers of
         mauve_msgs/msg/TransformOutcome.
-    TASK_SETTINGS: What add_component() takes by keyword, besides `states`.
+    TASK_SETTINGS: What add_component() takes by keyword, besides `states` and `max_slew`.
 )";
   bind_errors(module);
   bind_descriptions(module);

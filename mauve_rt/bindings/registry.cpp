@@ -286,6 +286,15 @@ Its actions run on the component's thread under the interpreter's lock.)")
           },
           py::arg("name"), "Its states, with the shell's properties as they are unless set.")
       .def(
+          "check_max_slew",
+          [](const PluginRegistry& self, const std::string& shell,
+             const std::map<std::string, double>& max_slew) {
+            const InterpreterUnlocked release;
+            SlewedOutputs({max_slew.begin(), max_slew.end()}, {}).limit(*self.make_shell(shell), {});
+          },
+          py::arg("shell"), py::arg("max_slew"),
+          "Raises MauveError unless a component with this shell can have it.")
+      .def(
           "describe_resource",
           [](const PluginRegistry& self, const std::string& kind, const std::string& type) {
             const ResourceParameters needed =

@@ -57,6 +57,12 @@ TaskSettings task_settings(const std::string& component, const py::kwargs& given
       check_states(settings.states, component);
       continue;
     }
+    if (name == "max_slew") {
+      const auto by_output = value.cast<std::map<std::string, double>>();
+      settings.max_slew.assign(by_output.begin(), by_output.end());
+      check_max_slew(settings.max_slew, component);
+      continue;
+    }
     const auto* setting = std::find_if(kTaskSettings.begin(), kTaskSettings.end(),
                                        [&name](const TaskSetting& each) { return each.name == name; });
     if (setting == kTaskSettings.end())

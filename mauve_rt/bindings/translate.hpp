@@ -206,6 +206,7 @@ struct ComponentDescription {
   time_ns_t deadline_ns;
   std::string overrun;
   std::vector<DescribedState> states;
+  std::vector<SlewRecord> slew_limits;
 };
 ComponentDescription describe_component(Component& component);
 

@@ -72,10 +72,20 @@ def print_held(reply: Any, out: Console) -> None:
 def _print_remarks(component: Any, out: Console) -> None:
     if enforced := ", ".join(state.name for state in component.states if state.wcet_enforced):
         out.print(f"[bold]{component.name}[/]: wcet_ns is enforced of {enforced}", soft_wrap=True)
+    for one in component.slew_limits:
+        text = f"{one.output} changes by at most {one.max_slew:g} per second: {slew_counts(one)}"
+        out.print(f"[bold]{component.name}[/]: {escape(text)}", soft_wrap=True)
     if component.fault:
         out.print(f"[bold red]{component.name}[/]: {escape(component.fault)}", soft_wrap=True)
     for probation in component.probations:
         out.print(f"[bold]{component.name}[/]: {escape(probation_line(probation))}", soft_wrap=True)
+
+
+def slew_counts(one: Any) -> str:
+    """How often max_slew has acted on a number, in words."""
+    text = f"{counted(one.limited, 'write')} limited"
+    stops = f", {counted(one.not_limited, 'value')} of a stop written at once"
+    return text + (stops if one.not_limited else "")
 
 
 def _authors(reply: Any) -> Iterator[tuple[str, str, str]]:

@@ -16,6 +16,7 @@ from mauve_msgs.msg import (
     ResourceInfo,
     Shadow,
     ShadowOutput,
+    SlewLimit,
     StateInfo,
     StepReport,
     TaskInfo,
@@ -34,6 +35,7 @@ from mauve_rt._kernel import (
     PortDescription,
     ProbationRecord,
     ShadowRecord,
+    SlewRecord,
 )
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
@@ -100,8 +102,14 @@ def component_info(
         overrun=component.overrun,
         states=[_state_info(state, times or {}) for state in component.states],
         authors=_authored(authors),
+        slew_limits=[slew_limit(record) for record in component.slew_limits],
         bounds=[JobBound(**asdict(bound)) for bound in bounds],
     )
+
+
+def slew_limit(record: SlewRecord) -> Any:
+    """SlewLimit of a number of an output."""
+    return SlewLimit(**{name: getattr(record, name) for name in SlewLimit.get_fields_and_field_types()})
 
 
 def _authored(authors: Mapping[str, str]) -> list[str]:

@@ -45,6 +45,7 @@ class Checks:
             found += self._component(component)
             found += self._properties(component)
             found += self._frames(component)
+            found += self._max_slew(component)
         for resource in self._model.resources:
             found += self._resource(resource)
         for connection in self._model.connections:
@@ -189,6 +190,23 @@ class Checks:
                         remedy="remove it from the file, or correct the code of the shell",
                         code="frame_mismatch",
                     )
+
+    def _max_slew(self, name: str) -> Iterator[Problem]:
+        """Numbers that the component does not write."""
+        if name not in self._shells:
+            return
+        for output, per_second in self._model.components[name].max_slew.items():
+            try:
+                self._loader.registry.check_max_slew(self._shells[name].name, {output: per_second})
+            except MauveError as error:
+                yield self._model.key_problem(
+                    ("components", name, "max_slew", output),
+                    error.statement,
+                    expected=error.expected,
+                    found=error.found,
+                    remedy=error.remedy,
+                    code=error.code,
+                )
 
     def _resource(self, name: str) -> Iterator[Problem]:
         resource = self._model.resources[name]

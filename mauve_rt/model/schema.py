@@ -78,6 +78,10 @@ _NAMESPACE = Text(
 _VALUE_NAME = Text(r"\w+(?:\.\w+)?", "a resource, or component.port")
 DEFAULT_MIRROR_HZ, MAX_MIRROR_HZ = 50.0, 1000.0
 _ENDPOINT = Text(r"\w+\.\w+", "name.port or name.service")
+_OUTPUT_NUMBER = Text(
+    rf"{_IDENTIFIER}(?:\.\w+(?:\[\d+\])*)+",
+    "a write port, a dot and the path of a number, such as command.torque or command.axes[0]",
+)
 _RESOURCE_KIND = Text(
     rf"{'|'.join(given_kinds())}|{_PLUGIN}",
     f"{', '.join(given_kinds())} or the name of a plug-in, package/Class",
@@ -597,6 +601,12 @@ class ComponentModel(Section):
         "frames of the values of ports by name, in addition to those in the code of the shell",
         default={},
     )
+    max_slew: dict[str, float] = setting(
+        TableOf(Real(above=0), names=_OUTPUT_NUMBER),
+        "greatest change per second of a number that the component writes, by PORT.PATH such as "
+        "command.torque, whatever its core asks for",
+        default={},
+    )
     diagnostics: DiagnosticsModel = setting(
         Part(DiagnosticsModel),
         "thresholds of /diagnostics in the place of those of the executor; null removes one",
@@ -613,7 +623,8 @@ class ComponentModel(Section):
         states = {
             name: {key: getattr(state, key) for key in state.given} for name, state in self.states.items()
         }
-        return {**told, "states": states} if states else told
+        told |= {"states": states} if states else {}
+        return told | ({"max_slew": dict(self.max_slew)} if self.max_slew else {})
 
 
 class FileModel(Section):

@@ -29,6 +29,7 @@ PAGES_OF_CLAIMS = (
             *(
                 "compare_in_shadow",
                 "install",
+                "limit_outputs",
                 "log_lines",
                 "operate",
                 "record_and_report",

@@ -183,7 +183,10 @@ void PortBase::swap(PortConnection& connection) noexcept {
 void PortBase::write_stopped(time_ns_t time_ns) noexcept {
   if (output().on_stop != OutputPolicy::set_zero) return;
   const StopWrite as_stop(connection_.service, time_ns);
-  write_zero(time_ns);
+  if (slew_limit_ == nullptr) return write_zero(time_ns);
+  if (connection_.service == nullptr) return;
+  slew_limit_->note_stop(time_ns);
+  write_zero_to(*connection_.service, time_ns);
 }
 
 bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
@@ -200,11 +203,49 @@ bool PortBase::make_safe(bool may_wait, time_ns_t time_ns) noexcept {
 
 bool PortBase::make_safe(ServiceBase& service, bool may_wait, time_ns_t time_ns) noexcept {
   if (output().on_stop != OutputPolicy::set_zero) return true;
+  if (slew_limit_ != nullptr) slew_limit_->note_stop(time_ns);
   const StopWrite as_stop(&service, time_ns);
   const TryWrite tried = try_write_zero(service, time_ns);
   if (tried != TryWrite::must_wait || !may_wait) return tried == TryWrite::done;
   write_zero_to(service, time_ns);
   return true;
+}
+
+void PortBase::limit_slew(std::shared_ptr<SlewedOutput> output) {
+  const auto refuse = [this](const char* what, const std::string& path, const std::string& expected,
+                             const std::string& found, const char* remedy) {
+    throw Error(ErrorCode::invalid_argument, what,
+                {.element = "max_slew " + name_ + (path.empty() ? "" : "." + path),
+                 .expected = expected,
+                 .found = found,
+                 .remedy = remedy});
+  };
+  if (kind_ != PortKind::write) {
+    refuse("max_slew is of numbers that the component writes", {}, "a write port",
+           "a port of kind " + std::string(to_string(kind_)), "name one of the component's write ports");
+  }
+  const void* const zero = make_room_to_limit();
+  if (zero == nullptr) {
+    refuse("the port's values cannot be copied in real time", {}, "a trivially copyable C++ type",
+           type_ + " in " + std::string(representation()),
+           "let a plug-in library register a C++ struct of the type, without texts and lists of any length");
+  }
+  std::vector<NumberPlace> places;
+  for (const SlewedNumber& number : output->numbers()) {
+    const std::optional<NumberPlace> place = find_number(number.path);
+    if (!place || place->store == nullptr) {
+      refuse("the output has no such number", number.path,
+             "a field of " + type_ + " that is a number, not in a text or a list whose length changes",
+             number.path, "name the field of a number, such as twist.linear.x or torque[0]");
+    }
+    places.push_back(place.value_or(NumberPlace{}));
+  }
+  slew_limit_ = std::make_unique<SlewLimit>(std::move(output), std::move(places), zero);
+  set_special(kLimited, kLimited);
+}
+
+bool PortBase::ramps_down_at(time_ns_t time_ns) noexcept {
+  return is_ramped() && connection_.service != nullptr && slew_limit_->is_beyond(time_ns);
 }
 
 void PortBase::leave_behind() noexcept {

@@ -225,9 +225,9 @@ std::vector<std::shared_ptr<Component>> Host::hosted() const {
 
 void Host::stop_all(time_ns_t until_ns) noexcept {
   const auto components = hosted();
-  const auto stop = [](Task& task, time_ns_t by_ns) {
+  const auto stop = [](Task& task, time_ns_t by_ns, bool force = false) {
     try {
-      task.stop(std::max<time_ns_t>(0, by_ns - monotonic_now_ns()));
+      task.stop(std::max<time_ns_t>(0, by_ns - monotonic_now_ns()), force);
     } catch (const Error&) {  // still in a state, or faulted by now: ending its thread is the answer
     }
   };
@@ -237,7 +237,9 @@ void Host::stop_all(time_ns_t until_ns) noexcept {
     if (task.state() == ComponentState::running) stop(task, in_order_until);
   }
   for (const auto& component : components) {
-    if (component->task().state() == ComponentState::stopping) stop(component->task(), until_ns);
+    Task& task = component->task();
+    // In virtual time no instant comes for another step of an output with a max_slew.
+    if (task.state() == ComponentState::stopping) stop(task, until_ns, task.is_simulated());
     component->conclude_probation();
     component->conclude_shadow();
   }

@@ -209,6 +209,7 @@ void Component::show() {
 
 void Component::set_settings(const TaskSettings& settings) {
   check_settings(settings, name_);
+  slewed_ = SlewedOutputs(settings.max_slew, name_);
   task_.set_settings(settings);
 }
 
@@ -528,17 +529,18 @@ bool Component::is_fallback_in() const noexcept {
   return fallback_ != nullptr && fallback_->was_taken() && task_.has_fallen_back();
 }
 
-void Component::give_frames(Shell& shell) const {
+void Component::set_up_ports(Shell& shell) const {
   for (const auto& [port, frames] : frames_) {
     PortBase* const found = shell.find_port(port);
     if (found != nullptr) found->declare_frames(frames);
   }
+  slewed_.limit(shell, name_);
 }
 
 Parts Component::another() const {
   const CoreBase& declared = is_fallback_in() ? *fallback_->core() : *parts_.core;
   Parts parts{.shell = shell().another(), .core = declared.another(), .fsm = fsm().another()};
-  if (parts.shell != nullptr) give_frames(*parts.shell);
+  if (parts.shell != nullptr) set_up_ports(*parts.shell);
   return parts;
 }
 

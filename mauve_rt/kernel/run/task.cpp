@@ -412,10 +412,14 @@ bool Task::stop(time_ns_t timeout_ns, bool force, std::uint64_t expected_revisio
   const time_ns_t until = later_by(monotonic_now_ns(), timeout_ns);
   if (expected_revision == 0 && withdraw_start()) return false;
   const std::uint32_t run = order_stop(expected_revision);
+  if (force) control_.fetch_or(kAtOnce, std::memory_order_acq_rel);
   changes_.bump();
   if (is_called_from_own_state())
     return false;  // it takes effect when the state ends, for which nobody can wait here
-  if (simulated_) resume();
+  if (simulated_) {
+    resume();
+    if (is_ramping_.load(std::memory_order_relaxed)) return false;  // relaxed: this thread runs it
+  }
   futex_wake_all(control_);
   // RUNNING again is a fallback that came in meanwhile: it finds the stop in its first wait.
   // In another run somebody has started it again since: this stop has had its effect.
@@ -429,6 +433,13 @@ bool Task::stop(time_ns_t timeout_ns, bool force, std::uint64_t expected_revisio
     if (futex_wait_until(state_, seen, until)) continue;
     if (!is_going(state_.load(std::memory_order_acquire))) break;
     if (force && time_out_unless_waiting()) return true;
+    if (is_ramping_.load(std::memory_order_relaxed)) {  // relaxed: it words a message
+      throw Error(ErrorCode::timeout,
+                  "max_slew still moves the outputs to the values of the stop, which stays pending",
+                  {.component = name_,
+                   .expected = "the end of that within " + std::to_string(timeout_ns / ms_to_ns(1)) + " ms",
+                   .remedy = "give the stop more time; a stop by force writes the values at once"});
+    }
     throw_state_running("the stop stays pending", timeout_ns,
                         force
                             ? "it takes effect when the component's thread gets to run"

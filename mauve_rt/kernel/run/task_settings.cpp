@@ -42,6 +42,7 @@ void check_settings(const TaskSettings& settings, const std::string& component) 
     if (value != setting.get(TaskSettings{})) check_setting(setting, value, component);
   }
   check_states(settings.states, component);
+  check_max_slew(settings.max_slew, component);
 }
 
 void check_states(const std::vector<DeclaredState>& states, const std::string& component) {

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A task's steps around its machine's: commands, events, faults. Everything between a start and a park is real-time code.
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -43,7 +44,7 @@ void Task::visit_simulated() noexcept {
 void Task::step() {
   if (!machine_.is_started()) return take_up_start();
   const std::uint32_t control = control_.load(std::memory_order_acquire);
-  if ((control & kStop) != 0) return park_stopped();
+  if ((control & kStop) != 0) return end_run();
   if ((control & kRevert) != 0) take_up_revert();
   if ((control & kCommit) != 0 && !visit_posted()) return;
   if ((control & kEvent) != 0) settle_event();
@@ -79,6 +80,9 @@ void Task::take_up_start() {
 
 void Task::start_machine(time_ns_t instant_ns) noexcept {
   machine_.start(instant_ns);
+  // The time in which it was stopped is no time to move in: the first write may move as far as in any release.
+  for (const auto& port : shell()->ports())
+    port->resume_slew(later_by(machine_.clock_ns(), -grid().period_ns));
   if (shadow_.is_set()) [[unlikely]]
     start_shadow();
   parked_.store(0, std::memory_order_release);
@@ -102,7 +106,7 @@ void Task::run_to_next_wait() {
   machine_.leave_wait();
   for (;;) {
     const std::uint32_t control = control_.load(std::memory_order_acquire);
-    if ((control & kStop) != 0) return park_stopped();
+    if ((control & kStop) != 0) return end_run();
     if ((control & kGivenUp) != 0 && machine_.execution().has_timed_out()) [[unlikely]]
       return park_timed_out();
     switch (machine_.enter_next()) {
@@ -158,6 +162,39 @@ void Task::await(const Atomic<std::uint32_t>& word, std::uint32_t number, time_n
 void Task::signal_awaited() noexcept {
   control_.fetch_or(kAwaited, std::memory_order_acq_rel);
   futex_wake_all(control_);
+}
+
+void Task::end_run() noexcept {
+  if (!ramps_down()) park_stopped();
+}
+
+/// False: the next step of outputs with a max_slew is the value of the stop itself, or they are not to be waited for. Else one step of
+/// them is written at each instant of the grid, in the place of a release.
+bool Task::ramps_down() noexcept {
+  const time_ns_t period_ns = grid().period_ns;
+  if (period_ns == 0 || (control_.load(std::memory_order_acquire) & (kExit | kAtOnce)) != 0) return false;
+  const auto& ports = shell()->ports();
+  const time_ns_t instant_ns = machine_.clock_ns();
+  // As at a start: the time without a write before the stop is no time to move in.
+  for (const auto& port : ports) port->resume_slew(later_by(instant_ns, -period_ns));
+  const auto is_beyond = [&](const auto& port) { return port->ramps_down_at(instant_ns); };
+  if (std::none_of(ports.begin(), ports.end(), is_beyond)) return false;
+  control_.fetch_and(~kCommit, std::memory_order_acq_rel);
+  const bool has_new_parts = settle_slot();  // a change does not wait for the end of the ramp
+  release_withdrawn();
+  if (has_new_parts) return false;
+  if (!is_ramping_.exchange(true, std::memory_order_relaxed)) {
+    for (const auto& port : ports) {
+      if (!port->is_ramped()) port->write_stopped(instant_ns);
+    }
+  }
+  if (clock().now_ns() < due_ns()) return true;
+  for (const auto& port : ports) {
+    if (port->is_ramped()) port->write_zero(instant_ns);
+  }
+  machine_.skip_to(later_by(instant_ns, period_ns));
+  machine_.tell_wait();
+  return true;
 }
 
 void Task::park_stopped() noexcept {
@@ -221,7 +258,8 @@ void Task::park(ComponentState state) noexcept {
   machine_.park();
   revert_in_park();
   overlong_ns_ = 0;
-  control_.fetch_and(~(kStop | kEvent | kRevert | kGivenUp), std::memory_order_acq_rel);
+  is_ramping_.store(false, std::memory_order_relaxed);
+  control_.fetch_and(~(kStop | kEvent | kRevert | kGivenUp | kAtOnce), std::memory_order_acq_rel);
   parked_.store(1, std::memory_order_seq_cst);  // seq_cst: a requester that has not seen it has posted before
   publish_state(state);
   ended_runs_.fetch_add(

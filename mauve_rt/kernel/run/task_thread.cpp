@@ -117,7 +117,8 @@ void Task::thread_main() noexcept {
 
 bool Task::must_act(std::uint32_t control) noexcept {
   if (!machine_.is_started()) return (control & (kStart | kCommit)) != 0;
-  if ((control & kStop) != 0) return true;
+  if ((control & kStop) != 0)  // relaxed: its own
+    return !is_ramping_.load(std::memory_order_relaxed) || (control & (kCommit | kExit | kAtOnce)) != 0;
   if ((control & kEvent) != 0 && !machine_.is_settled()) return true;
   return (control & (kCommit | kRevert)) != 0;
 }

@@ -140,6 +140,9 @@ class Diagnostics:
             values[f"execution_mean_ns[{time.state}]"] = time.mean_ns
             values[f"execution_max_ns[{time.state}]"] = time.max_ns
             values[f"execution_recent_max_ns[{time.state}]"] = recent.execution_ns.get(time.state, 0)
+        for slew in part.slew_limits:
+            values[f"slew_limited[{slew.output}]"] = slew.limited
+            values[f"slew_not_limited[{slew.output}]"] = slew.not_limited
         if bounds:
             values["violations"] = violations
         for one in bounds:

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from mauve_msgs.msg import ComponentInfo, HeldElement, JobBound, PortInfo, ResourceInfo, StateInfo
+from mauve_msgs.msg import ComponentInfo, HeldElement, JobBound, PortInfo, ResourceInfo, SlewLimit, StateInfo
 from mauve_msgs.srv import ListComponents
 from mauve_rt.cli.list_view import STATES, print_components
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
@@ -194,6 +194,20 @@ def test_enforced_worst_cases_are_named() -> None:
     parts = [ComponentInfo(name="control", states=states), ComponentInfo(name="other", states=states[2:])]
     told = [line for line in _printed(ListComponents.Response(components=parts)) if "enforced" in line]
     assert told == ["control: wcet_ns is enforced of Run, More"]
+
+
+def test_a_limit_of_an_output_is_told() -> None:
+    limits = [
+        SlewLimit(output="command.torque", max_slew=20.0, limited=37, not_limited=1),
+        SlewLimit(output="command.axes[0]", max_slew=0.5, limited=1),
+    ]
+    parts = [ComponentInfo(name="control", slew_limits=limits)]
+    first, second = [
+        line for line in _printed(ListComponents.Response(components=parts)) if "per second" in line
+    ]
+    counts = "37 writes limited, 1 value of a stop written at once"
+    assert first == f"control: command.torque changes by at most 20 per second: {counts}"
+    assert second == "control: command.axes[0] changes by at most 0.5 per second: 1 write limited"
 
 
 def test_mirrors_of_a_resource() -> None:

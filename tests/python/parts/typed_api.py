@@ -280,7 +280,9 @@ def run(registry: PluginRegistry) -> StepReport:
     architecture.add_resource(
         "named", kind="ring_buffer", type="std_msgs/msg/Bool", capacity=3, longest_hold_ns=9
     )
-    hover = architecture.add_component("hover", HoverShell, HoverCore, HoverFsm, priority=40, cpus=[0])
+    hover = architecture.add_component(
+        "hover", HoverShell, HoverCore, HoverFsm, priority=40, cpus=[0], max_slew={"out.x": 2.0}
+    )
     architecture.add_component("mixed", "package/Shell", NativeCore, "package/Fsm", overrun="catch_up")
     architecture.add_component("bad", HoverCore, HoverCore, HoverFsm)  # type: ignore[arg-type]
     assert_type(hover, Component)
@@ -298,6 +300,7 @@ def run(registry: PluginRegistry) -> StepReport:
     hover.configure_core()
     deployer.start("hover", clock)
     assert_type(hover.describe(), ComponentDescription)
+    assert_type(hover.describe().slew_limits[0].limited, int)
     assert_type(deployer.drain_trace(), TraceDrain)
     try:
         report = deployer.replace_core("hover", HoverCore, commit_timeout_ns=ms_to_ns(100))

@@ -164,3 +164,17 @@ connections:
     assert status.level == DiagnosticStatus.WARN
     assert "position has more elements than its memory holds, the resource's capacity is 2" in status.message
     assert int(health.values("turned")["refused_values"]) > 0
+
+
+def test_limited_outputs_are_counted(
+    architecture: Path, start_executor: Callable[..., Any], graph: Any
+) -> None:
+    text = architecture.read_text(encoding="utf-8")
+    text = text.replace("priority: 40", "priority: 40, max_slew: {count.data: 1.0}")
+    architecture.write_text(text, encoding="utf-8")
+    start_executor("-p", f"architecture:={architecture}")
+    health = Health(graph)
+    health.await_releases("counter", 20)
+    assert int(health.values("counter")["slew_limited[count.data]"]) >= 10
+    assert health.values("counter")["slew_not_limited[count.data]"] == "0"
+    assert not any("slew" in key for key in health.values("guard"))

@@ -40,7 +40,7 @@ constexpr StepKind steps::add_component{
           for (const auto& [port, frames] : rest.frames) find_port(*added.fresh.shell, port, step.target);
           added.component->declare_frames(rest.frames);
           try {
-            added.component->give_frames(*added.fresh.shell);
+            added.component->set_up_ports(*added.fresh.shell);
           } catch (const Error& failure) {
             rethrow_as_of(failure, step.target, draft.step());
           }

@@ -49,7 +49,8 @@ constexpr StepKind steps::bring_back{
       if (auto fallback = hung->another_fallback()) component.set_fallback(std::move(fallback));
       component.declare_frames(hung->declared_frames());
       added.fresh.shell = another(step.target, hung->shell());
-      component.give_frames(*added.fresh.shell);
+      component.continue_outputs_of(*hung);
+      component.set_up_ports(*added.fresh.shell);
       added.fresh.fsm = another(step.target, probation->old_fsm());
       added.wires = wires;
       for (const ShownProperty& property : hung->shown().properties)

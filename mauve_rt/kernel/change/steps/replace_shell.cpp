@@ -14,7 +14,7 @@ constexpr StepKind steps::replace_shell{
                                                          : draft.registry().make_shell(step.name);
       DraftComponent& changed = replacing(draft, step.target);
       try {
-        changed.component->give_frames(*shell);
+        changed.component->set_up_ports(*shell);
       } catch (const Error& failure) {
         rethrow_as_of(failure, step.target, draft.step());
       }

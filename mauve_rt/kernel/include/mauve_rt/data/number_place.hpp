@@ -3,8 +3,10 @@
 #pragma once
 
 #include <charconv>
+#include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,10 +22,15 @@ namespace mauve {
 struct NumberPlace {
   std::size_t offset{0};
   double (*convert)(const std::byte* at) noexcept {nullptr};
+  void (*store)(std::byte* at, double number, double toward) noexcept {nullptr};  // nullptr: of a bool
 
   /// [rt]
   double of(const void* value) const MAUVE_RT {
     return MAUVE_RT_TRUSTED(convert(static_cast<const std::byte*>(value) + offset));  // one of those below
+  }
+  /// Writes a finite number into the value, rounded toward the second one, which its type can hold. [rt]
+  void set(void* value, double number, double toward) const MAUVE_RT {
+    MAUVE_RT_TRUSTED(store(static_cast<std::byte*>(value) + offset, number, toward));  // one of those below
   }
 };
 
@@ -49,15 +56,39 @@ struct FindNumber {  // texts, and lists whose length changes, have no number at
   static std::optional<NumberPlace> in(const T& /*value*/, std::string_view /*path*/) { return {}; }
 };
 
+/// The nearest number of the type between the two.
+template <Primitive T>
+T rounded(double number, double toward) noexcept {
+  const bool is_above = number > toward;
+  if constexpr (std::is_floating_point_v<T>) {
+    const T near = static_cast<T>(number);
+    const bool is_beyond = is_above ? near > number : near < number;
+    return is_beyond ? std::nextafter(near, static_cast<T>(toward)) : near;
+  } else {
+    const double whole = is_above ? std::floor(number) : std::ceil(number);
+    // What a double has for the largest number of 64 bits is one more.
+    if (whole >= static_cast<double>(std::numeric_limits<T>::max())) return std::numeric_limits<T>::max();
+    if (whole <= static_cast<double>(std::numeric_limits<T>::min())) return std::numeric_limits<T>::min();
+    return static_cast<T>(whole);
+  }
+}
+
 template <Primitive T>
 struct FindNumber<T> {
   static std::optional<NumberPlace> in(const T& /*value*/, std::string_view path) {
     if (!path.empty()) return {};
-    return NumberPlace{.convert = [](const std::byte* at) noexcept {
+    NumberPlace place{.convert = [](const std::byte* at) noexcept {
       T number;
       std::memcpy(&number, at, sizeof(T));
       return static_cast<double>(number);
     }};
+    if constexpr (!std::is_same_v<T, bool>) {
+      place.store = [](std::byte* at, double number, double toward) noexcept {
+        const T stored = rounded<T>(number, toward);
+        std::memcpy(at, &stored, sizeof(T));
+      };
+    }
+    return place;
   }
 };
 

@@ -270,6 +270,7 @@ class WritePort final : public PortBase {
         if (is_closed()) return true;
         if (is_tapped()) tell_write(borrowed.place);
         if (!admits(borrowed.place)) return true;
+        if (slew_limit() != nullptr) return publish_limited(borrowed);
       }
       const bool taken = service_->publish(*std::exchange(borrowed.place, nullptr), stamp_ns(), seat_);
       if (is_special()) [[unlikely]]
@@ -282,7 +283,9 @@ class WritePort final : public PortBase {
   using PortBase::write_zero;
   void write_zero(time_ns_t time_ns) noexcept override {
     if (service_ == nullptr) return;
-    if (seat_ != nullptr && !seat_->is_mine()) {
+    if (slew_limit() != nullptr) {
+      put_limited(zero_, time_ns);
+    } else if (seat_ != nullptr && !seat_->is_mine()) {
       service_->write(zero_, time_ns);  // the component's thread may be inside
     } else {
       put(zero_, time_ns);
@@ -313,6 +316,11 @@ class WritePort final : public PortBase {
   }
 
  protected:
+  const void* make_room_to_limit() override {
+    if constexpr (!std::is_trivially_copyable_v<T>) return nullptr;
+    limited_ = std::make_unique<T>();
+    return &zero_;
+  }
   std::vector<std::byte> zero_message() const override {
     std::vector<std::byte> message;
     CdrWriter(message).put(zero_);
@@ -351,7 +359,27 @@ class WritePort final : public PortBase {
     if (is_closed() || is_previewed()) return true;
     if (is_tapped()) tell_write(&value);
     if (service_ == nullptr || !admits(&value)) return true;
-    const bool taken = put(value, stamp_ns());
+    const bool taken = slew_limit() != nullptr ? put_limited(value, stamp_ns()) : put(value, stamp_ns());
+    keep_zero();
+    return taken;
+  }
+  /// The value is dropped where its first number ever is none.
+  bool put_limited(const T& value, time_ns_t time_ns) noexcept {
+    if constexpr (std::is_trivially_copyable_v<T>) {  // else make_room_to_limit() has refused
+      *limited_ = value;
+      if (!slew_limit()->apply(limited_.get(), time_ns)) return true;
+      const bool taken = put(*limited_, time_ns);
+      if (taken) slew_limit()->keep(time_ns);
+      return taken;
+    }
+    return put(value, time_ns);
+  }
+  /// The same of a value that lies in the service's place already.
+  bool publish_limited(Borrowed& borrowed) noexcept {
+    const time_ns_t time_ns = stamp_ns();
+    if (!slew_limit()->apply(borrowed.place, time_ns)) return true;
+    const bool taken = service_->publish(*std::exchange(borrowed.place, nullptr), time_ns, seat_);
+    if (taken) slew_limit()->keep(time_ns);
     keep_zero();
     return taken;
   }
@@ -368,6 +396,8 @@ class WritePort final : public PortBase {
   BiasedMutex::Seat* seat_{nullptr};
   OutputOptions output_;
   T zero_{};  // kept here: large types do not belong on a small stack
+  /// A copy of the value that is written, with its numbers limited.
+  std::unique_ptr<T> limited_;
 };
 
 template <typename Signature>

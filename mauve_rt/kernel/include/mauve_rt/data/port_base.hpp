@@ -20,6 +20,7 @@
 #include "mauve_rt/data/port_cell.hpp"
 #include "mauve_rt/data/port_tap.hpp"
 #include "mauve_rt/data/service.hpp"
+#include "mauve_rt/data/slew_limit.hpp"
 
 namespace mauve {
 
@@ -56,13 +57,14 @@ struct ConnectedTo {
 /// A port does not know when its service ends: disconnect it before the resource goes.
 ///
 /// special_ says whether a read or a write may be anything but a look at the service: one load tells. Its bits: closed or left
-/// behind, by the watchdog and who removes the component; watched and tapped, with watch_ and tap_; previewed, with stand_ins_.
+/// behind, by the watchdog and who removes the component; watched and tapped, with watch_ and tap_; previewed, with stand_ins_;
+/// limited, with slew_limit_.
 ///
 /// | member      | written by                     | read by                   | order                                |
 /// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
 /// | connection_ | swap(), component parked       | component; connected_to() | parking publishes it; shown_mutex_   |
 /// | context_    | [setup]                        | component                 | -                                    |
-/// | optional_, frames_ | [setup]                 | any                       | -                                    |
+/// | optional_, frames_, slew_limit_ | [setup]    | any                       | -; the limit's own: slew_limit.hpp   |
 /// | special_    | see below                      | component                 | acq_rel: its zeros stay last; who sees a bit sees what it stands for |
 /// | is_safe_    | who writes its last output     | same                      | Task::outputs_: one at a time        |
 /// | is_counted_ | swap(), who removes it         | same                      | one change at a time                 |
@@ -129,10 +131,11 @@ class PortBase {
   void preview(const PortConnection& connection);
   void end_preview() noexcept;
 
-  /// Writes the type's default value, as of now or as of that time; a port that is no write port does nothing. [rt]
+  /// Writes the type's default value, as of now or as of that time, with numbers as near to it as their max_slew lets them come;
+  /// a port that is no write port does nothing. [rt]
   void write_zero() MAUVE_RT { write_zero(stamp_ns()); }
   virtual void write_zero(time_ns_t /*time_ns*/) MAUVE_RT {}
-  /// Writes what `on_stop` says, as the output of a stop: it is sent before all others. [rt]
+  /// Writes what `on_stop` says, as the output of a stop: it is sent before all others, and no max_slew holds it back. [rt]
   void write_stopped(time_ns_t time_ns) MAUVE_RT;
   /// The same to a service that fits the port, whether it is connected to it or not, without waiting for a lock. [rt]
   virtual TryWrite try_write_zero(ServiceBase& /*service*/, time_ns_t /*time_ns*/) MAUVE_RT {
@@ -174,6 +177,19 @@ class PortBase {
   }
   /// No thread uses this tap any more afterwards. [rt] As unwatch().
   void untap(const PortTap& tap) MAUVE_RT { tap_.revoke(tap, kForever); }
+  /// Numbers of what it writes move no faster than this output says, from the last value that was written for the output.
+  /// [setup] Throws Error (invalid_argument): no write port, no number there, values that cannot be copied in real time.
+  void limit_slew(std::shared_ptr<SlewedOutput> output);
+  /// Whether max_slew keeps the value of a stop from being reached in one step at that time. [rt], by who writes
+  bool ramps_down_at(time_ns_t time_ns) MAUVE_RT;
+  /// Whether a limit holds, and a stop writes its output. [rt]
+  bool is_ramped() const MAUVE_RT {
+    return slew_limit_ != nullptr && output().on_stop == OutputPolicy::set_zero;
+  }
+  /// The time before does not count: its component was stopped. [rt], by who writes
+  void resume_slew(time_ns_t time_ns) MAUVE_RT {
+    if (slew_limit_ != nullptr) slew_limit_->resume(time_ns);
+  }
   /// A cell for this port's values, not connected; nullptr: they are not trivially copyable, or not C++. [non-rt]
   virtual std::unique_ptr<PortCell> make_cell() const { return nullptr; }
   /// Where the number at a path lies in a value that it writes; nothing: there is none at a fixed place. [non-rt]
@@ -188,6 +204,10 @@ class PortBase {
   virtual bool write_serialized(std::span<const std::byte> /*message*/) { return false; }
 
  protected:
+  /// Makes room for a copy of a value; returns the type's default value, or nullptr: a copy may allocate. [setup]
+  virtual const void* make_room_to_limit() { return nullptr; }
+  /// nullptr: no number is limited. [rt]
+  SlewLimit* slew_limit() const MAUVE_RT { return slew_limit_.get(); }
   /// What write_zero() writes, as a message; empty: nothing. [non-rt]
   virtual std::vector<std::byte> zero_message() const { return {}; }
   /// Whether a service of equal kind and type name, and with messages that lie in memory as this port's, is of the class that
@@ -198,7 +218,7 @@ class PortBase {
   /// Another port of this type, for a preview; not connected.
   virtual std::unique_ptr<PortBase> make_stand_in() const = 0;
   bool is_previewed() const noexcept {
-    if (!is_special()) [[likely]]
+    if (!has(kPreviewed)) [[likely]]
       return false;
     return stand_ins_.find() != nullptr;
   }
@@ -236,7 +256,8 @@ class PortBase {
   bool keeps_zero() const MAUVE_RT { return has(kClosed); }
 
  private:
-  static constexpr std::uint32_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16;
+  static constexpr std::uint32_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16,
+                                 kLimited = 32;
 
   bool has(std::uint32_t bits) const noexcept {
     return (special_.load(std::memory_order_acquire) & bits) != 0;
@@ -278,6 +299,7 @@ class PortBase {
   bool is_seated_{false};  // has its seat at connection_.service
   RevocableReference<OutputWatch> watch_;
   RevocableReference<PortTap> tap_;
+  std::unique_ptr<SlewLimit> slew_limit_;
   Previews<std::unique_ptr<PortBase>> stand_ins_;
 };
 

@@ -318,9 +318,13 @@ class Component final : public Configurable {
   /// Frames of ports by name, in addition to those that its shells declare. [setup]
   void declare_frames(std::map<std::string, Frames> frames) { frames_ = std::move(frames); }
   const std::map<std::string, Frames>& declared_frames() const noexcept { return frames_; }
-  /// Lets a shell of this component have them; one without such a port is left alone. [setup], before it is connected.
-  /// Throws Error: invalid_argument (a name), frame_mismatch.
-  void give_frames(Shell& shell) const;
+  /// Lets the ports of a shell of this component have them, where it has such a port, and the component's max_slew. [setup], before it
+  /// is connected. Throws Error: invalid_argument (a name; no number to limit), frame_mismatch, unknown_port (of max_slew).
+  void set_up_ports(Shell& shell) const;
+  /// The numbers of its outputs that have a max_slew, and how often that has acted. [non-rt]
+  std::vector<SlewRecord> slews() const { return slewed_.records(); }
+  /// Its outputs go on from the last values of this component, whose place it takes. [setup]
+  void continue_outputs_of(const Component& other) noexcept { slewed_.continue_from(other.slewed_); }
   bool is_reconfigurable() const noexcept { return reconfigurable_; }
   /// Throws Error: not_reconfigurable, undeclared_core.
   void check_allowed(const std::string& core_implementation) const;
@@ -495,6 +499,7 @@ class Component final : public Configurable {
   std::string declared_core_;
   std::vector<std::string> alternatives_;
   std::map<std::string, Frames> frames_;
+  SlewedOutputs slewed_;
   bool reconfigurable_{true};
   CoreBase* spare_{nullptr};                 // the fallback while one is ready or in force
   std::unique_ptr<CoreBase> fallback_core_;  // until it is put in

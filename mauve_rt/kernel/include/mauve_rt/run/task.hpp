@@ -91,6 +91,7 @@ struct ChangeSignal {
 /// | parked_, ready_, ended_| machine                               | commanders   | release/acquire: all it wrote      |
 /// | started_               | machine; commanders clear it          | commanders   | release/acquire: all it wrote      |
 /// | ended_runs_            | machine                               | who stops    | release/acquire: the run's end     |
+/// | is_ramping_            | machine                               | machine, who stops | relaxed: who stops words a message by it |
 /// | start_at_ns_, start_.. | commanders, machine parked            | machine      | the kStart bit of control_         |
 /// | outputs_ (futex)       | who times it out, writer, machine     | all of these | acq_rel: one at a time writes them |
 /// | demoted_, time_out_note_ | who times it out, machine           | machine      | execution_                         |
@@ -236,6 +237,8 @@ class Task final : public Waiter {
   /// A commit that the component takes part in is called off, unless it is made: then it is taken first. Waits for no other
   /// component.
   /// From one of the component's own states it is pending by the return, and takes effect when the state ends.
+  /// Outputs with a max_slew are moved to the value of the stop first, one step a period; by force, at the end of the thread and without
+  /// a period that value is written at once. In virtual time the stop is pending by the return then.
   /// By force: a component that still executes a state, or a guard, when the time is over is given up: it is FAULTED, its outputs
   /// are written as on a stop, its thread is demoted and left behind until the state ends. True when that was done.
   /// Throws Error: not_running; timeout naming the state still running - the stop then stays pending; wrong_revision where
@@ -383,7 +386,8 @@ class Task final : public Waiter {
 
  private:
   static constexpr std::uint32_t kStop = 1, kCommit = 2, kStart = 4, kExit = 8, kEvent = 16, kAwaited = 32,
-                                 kRevert = 64, kGivenUp = 128;         // of control_
+                                 kRevert = 64, kGivenUp = 128,
+                                 kAtOnce = 256;                        // of control_
   enum ReconfigurationPhase : std::int64_t { kAdopt = 1, kTake = 2 };  // as the trace has them
 
   // commands
@@ -436,6 +440,8 @@ class Task final : public Waiter {
   bool enter_slot() MAUVE_RT;
   void leave_slot(std::uint32_t to) MAUVE_RT;
   void skip_lost(Participant& participant, time_ns_t began_ns) noexcept;
+  void end_run() noexcept;
+  bool ramps_down() noexcept;
   void park_stopped() noexcept;
   void park_faulted(const char* what, time_ns_t bound_ns = 0, time_ns_t cpu_ns = 0) noexcept;
   void park_timed_out(bool has_taken_change = false) noexcept;
@@ -502,6 +508,7 @@ class Task final : public Waiter {
   Atomic<std::uint32_t> started_{
       1};  // the start that was posted last has been taken up; none is open at first
   Atomic<std::uint32_t> ended_runs_{0};
+  Atomic<bool> is_ramping_{false};
   static constexpr std::uint32_t kEmpty = 0, kPosted = 1, kBusy = 2, kSlot = 3, kWaited = 4;  // of slot_
   Atomic<std::uint32_t> slot_{kEmpty};
   Atomic<Participant*> participant_{nullptr};

@@ -16,6 +16,7 @@
 #include "mauve_rt/base/log.hpp"
 #include "mauve_rt/base/time.hpp"
 #include "mauve_rt/parts/declared_state.hpp"
+#include "mauve_rt/parts/slewed_outputs.hpp"
 
 namespace mauve {
 
@@ -41,6 +42,7 @@ struct TaskSettings {
   LogLevel log_level{LogLevel::info};  // its log lines below are not kept; what it begins with
   bool enforce_wcet{false};  // wcet_ns of an execution state is a budget of CPU time; a fault above it
   std::vector<DeclaredState> states{};  // of the fsm's execution states
+  MaxSlew max_slew{};  // "command.torque": greatest change per second of a number of an output
   bool operator==(const TaskSettings&) const = default;
 };
 
@@ -75,7 +77,7 @@ constexpr TaskSetting number_setting(std::string_view name, std::int64_t least, 
           }};
 }
 
-/// The table: what is added to TaskSettings gets a line here, unless it is of each state.
+/// The table: what is added to TaskSettings gets a line here, unless it is of each state or of each output.
 inline constexpr std::array kTaskSettings{
     number_setting<&TaskSettings::priority>("priority", 1, 98,
                                             "1 is the lowest, 98 the highest; 99 is kept for the watchdog"),
