@@ -278,7 +278,8 @@ void TransactionCommit::Work::gather() {
     place->replaces_parts = change.parts != nullptr;
     if (change.parts != nullptr && change.draft->restarts) change.parts->give_up_place();
     if (change.parts != nullptr && change.parts->candidate() != nullptr) {
-      commit->set_last(*place, change.draft->bumpless->within_ns, *host_);
+      commit->set_last(*place, change.draft->bumpless->within_ns,
+                       [host = host_](time_ns_t until_ns) { return host->pass_time(until_ns); });
       swapped_ = {.candidate = change.parts->candidate(), .step = change.draft->core_step};
     }
     place->repairs = change.draft->is_repaired();

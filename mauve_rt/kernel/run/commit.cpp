@@ -6,7 +6,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "mauve_rt/architecture/runner.hpp"
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
@@ -434,7 +433,7 @@ bool Commit::is_last_asked() const noexcept {
 void Commit::let_time_pass() noexcept {
   if (last_ == nullptr) return;
   const time_ns_t until_ns = later_by(last_->task->clock().now_ns(), ready_within_ns_);
-  while (cut_.look().is_open() && runner_->pass_time(until_ns)) call_off_if_one_left();
+  while (cut_.look().is_open() && pass_time_(until_ns)) call_off_if_one_left();
 }
 
 /// A stop, a fault or a time-out wins: what it does not get to do itself is done here.

@@ -162,6 +162,7 @@ def test_the_report_of_a_late_component_has_the_instant_and_no_release() -> None
         release_ns=NOT_MEASURED,
         taken=["sum"],
         left=[],
+        outputs=[],
     )
     measured: Any = SimpleNamespace(steps=[late], prepare_ns=5, blackout_ns=0, is_complete=False)
     (report,) = reports_of((Step("set_property", "a", "x", "1"),), measured)

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <exception>
+#include <functional>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/base/contract.hpp"
@@ -17,7 +19,6 @@ namespace mauve {
 
 class CommitGate;
 class Publication;
-class Runner;
 class Task;
 
 /// One part of a change. Prepared on an ordinary thread; adopt and take run on the thread of the component that the action
@@ -206,11 +207,11 @@ class Commit {
   /// [rt]
   bool is_idle() const MAUVE_RT { return is_idle_; }
   /// The participant, which runs, votes after all others, once its actions are ready. The change is called off when they are not so
-  /// long after it was posted. In virtual time the runner lets that time pass. [setup]
-  void set_last(Participant& participant, time_ns_t within_ns, Runner& runner) noexcept {
+  /// long after it was posted. In virtual time `pass_time` lets that time pass, up to its argument: false when it is reached. [setup]
+  void set_last(Participant& participant, time_ns_t within_ns, std::function<bool(time_ns_t)> pass_time) {
     last_ = &participant;
     ready_within_ns_ = within_ns;
-    runner_ = &runner;
+    pass_time_ = std::move(pass_time);
   }
   /// Whether the participant may vote in this wait. [rt], the participant's thread
   bool is_ready(Participant& participant) MAUVE_RT;
@@ -343,7 +344,7 @@ class Commit {
   time_ns_t idle_within_ns_{0};
   Participant* last_{nullptr};  // votes last; nullptr: in any order
   time_ns_t ready_within_ns_{0};
-  Runner* runner_{nullptr};
+  std::function<bool(time_ns_t)> pass_time_{};
   bool is_one_cpu_{false};
   const Participant* closer_{nullptr};           // the lowest that runs; nullptr: all are parked
   Atomic<const Participant*> pending_{nullptr};  // at the last look for an idle instant
