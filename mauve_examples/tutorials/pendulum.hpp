@@ -13,7 +13,7 @@ using Scalar = mauve::types::Float64;
 inline constexpr double kSamplePeriodS = 1e-3;
 
 struct PendulumShell : mauve::Shell {
-  mauve::ReadPort<Scalar>& torque = read_port<Scalar>("torque");   // Nm
+  mauve::ReadPort<Scalar>& torque = read_port<Scalar>("torque");  // Nm
   mauve::WritePort<Scalar>& angle = write_port<Scalar>("angle");  // rad; 0: it hangs
 };
 
@@ -22,8 +22,8 @@ class Pendulum final : public mauve::Core<PendulumShell> {
  public:
   void move() {
     constexpr double kMass = 1.0, kLength = 0.5, kGravity = 9.81, kFriction = 0.2;
-    const double torque = shell().torque.read().value.data - kFriction * speed_ -
-                          kMass * kGravity * kLength * std::sin(angle_);
+    const double torque =
+        shell().torque.read().value.data - kFriction * speed_ - kMass * kGravity * kLength * std::sin(angle_);
     speed_ += kSamplePeriodS * torque / (kMass * kLength * kLength);
     angle_ += kSamplePeriodS * speed_;
     shell().angle.write({.data = angle_});
@@ -46,8 +46,7 @@ struct PendulumFsm : mauve::Fsm<PendulumShell, Pendulum> {
 };
 
 struct AngleControllerShell : mauve::Shell {
-  mauve::Property<double>& target =
-      property("target", 0.8, {.unit = "rad", .minimum = -1.5, .maximum = 1.5});
+  mauve::Property<double>& target = property("target", 0.8, {.unit = "rad", .minimum = -1.5, .maximum = 1.5});
   mauve::ReadPort<Scalar>& angle = read_port<Scalar>("angle");
   mauve::WritePort<Scalar>& torque = write_port<Scalar>("torque");
 };

@@ -47,9 +47,9 @@ struct DraftComponent {
   std::shared_ptr<Shadow> shadow{};             // begins
   int shadow_step{0};
   std::shared_ptr<Shadow> candidate{};  // of a bumpless change that found no shadow
-  bool core_unready{false};  // the new core is put in as it is
-  int configure_step{0};     // the last that configures it anew
-  bool is_made_anew{false};  // by new instances of its parts
+  bool core_unready{false};             // the new core is put in as it is
+  int configure_step{0};                // the last that configures it anew
+  bool is_made_anew{false};             // by new instances of its parts
   int first_step{0};
   std::shared_ptr<Probation>
       comeback_of{};  // its core is taken over from that one, which has it back when the change is not made

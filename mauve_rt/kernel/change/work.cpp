@@ -239,7 +239,8 @@ void TransactionCommit::Work::draft_steps() {
   }
   for (const DraftComponent& component : draft_->components()) {
     if (!options_.idle || !component.bumpless) continue;
-    throw Error(ErrorCode::invalid_argument, "a bumpless change waits for near outputs, not for an idle instant",
+    throw Error(ErrorCode::invalid_argument,
+                "a bumpless change waits for near outputs, not for an idle instant",
                 {.component = component.name(),
                  .element = "idle",
                  .remedy = "leave out `idle` or `bumpless`",
@@ -450,8 +451,9 @@ void TransactionCommit::Work::throw_if_not_near(const Change& change) const {
                      .element = "bumpless",
                      .expected = {},
                      .found = has_ended ? record.reason : std::string{},
-                     .remedy = has_ended ? "correct the candidate; nothing was changed"
-                                         : "allow a greater step or more time (within_s), or hand over more state",
+                     .remedy = has_ended
+                                   ? "correct the candidate; nothing was changed"
+                                   : "allow a greater step or more time (within_s), or hand over more state",
                      .step = change.draft->core_step,
                      .step_name = text_of(change.draft->core_step)};
   for (const OutputStep& output : record.steps) {
@@ -465,8 +467,8 @@ void TransactionCommit::Work::throw_if_not_near(const Change& change) const {
                                std::to_string(output.least_instant_ns) + " ns");
   }
   if (has_ended)
-    throw Error(ErrorCode::adopt_refused, "the candidate ended before its outputs were near those of the core",
-                detail);
+    throw Error(ErrorCode::adopt_refused,
+                "the candidate ended before its outputs were near those of the core", detail);
   detail.found += "; " + std::to_string(record.compared) + " of " + std::to_string(record.releases) +
                   " releases compared";
   throw Error(ErrorCode::timeout,

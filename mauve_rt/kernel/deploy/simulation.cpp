@@ -228,9 +228,7 @@ const RealtimeStatus& SimulatedHost::realtime_status() const noexcept {
   return none;
 }
 
-bool SimulatedHost::pass_time(time_ns_t until_ns) noexcept {
-  return simulation_.step_in_change(until_ns);
-}
+bool SimulatedHost::pass_time(time_ns_t until_ns) noexcept { return simulation_.step_in_change(until_ns); }
 
 void SimulatedHost::begin_task(Task& task) { task.simulate(processor_.clock, simulation_.options_.trace); }
 

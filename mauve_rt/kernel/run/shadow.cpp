@@ -193,9 +193,8 @@ bool Shadow::await_outputs() noexcept {
 }
 
 bool Shadow::measure_steps() noexcept {
-  steps_->note_first([this](std::size_t port) MAUVE_RT {
-    return capture_.is_noted(port) ? capture_.present(port) : nullptr;
-  });
+  steps_->note_first([this](std::size_t port)
+                         MAUVE_RT { return capture_.is_noted(port) ? capture_.present(port) : nullptr; });
   capture_.forget_release();
   if (!steps_->are_known()) return false;
   awaits_outputs_.store(false, std::memory_order_release);

@@ -119,7 +119,8 @@ TYPED_TEST(Bumpless, TheCoreGoesInWhereItsOutputsAreNear) {
 }
 
 TYPED_TEST(Bumpless, NoOutputOfAChangeBetweenConvergingCoresIsBeyondItsStep) {
-  Component& component = this->deploy_live([](const CountingCore& core) { return std::sin(1e-3 * core.count()); });
+  Component& component =
+      this->deploy_live([](const CountingCore& core) { return std::sin(1e-3 * core.count()); });
   const auto report = this->host.commit(this->replacement(
       [](const CountingCore& core) {
         return std::sin(1e-3 * core.count()) + std::exp(-0.01 * core.runs.load());
@@ -198,13 +199,14 @@ TYPED_TEST(Bumpless, ACandidateThatMissesReleasesHasTheStateAllTheSame) {
 TYPED_TEST(Bumpless, ACoreThatDoesNotComeNearIsRefusedWithItsLeastDifference) {
   Component& component = this->deploy_live([](const CountingCore&) { return 1.0; });
   std::string text;
-  EXPECT_EQ(ErrorCode::timeout, this->code_of(
-                                    [&] {
-                                      this->host.commit(this->replacement(
-                                          [](const CountingCore& core) { return core.rounds % 7 == 0 ? 1.5 : 9.0; },
-                                          this->within(0.25, ms_to_ns(200))));
-                                    },
-                                    &text));
+  EXPECT_EQ(ErrorCode::timeout,
+            this->code_of(
+                [&] {
+                  this->host.commit(this->replacement(
+                      [](const CountingCore& core) { return core.rounds % 7 == 0 ? 1.5 : 9.0; },
+                      this->within(0.25, ms_to_ns(200))));
+                },
+                &text));
   EXPECT_THAT(text, HasSubstr("did not come near those of the core within 200 ms"));
   EXPECT_THAT(text, HasSubstr("output.value within 0.25"));
   EXPECT_THAT(text, HasSubstr("output.value at least 0.5 apart, at instant "));
@@ -238,7 +240,8 @@ TYPED_TEST(Bumpless, ACandidateThatFaultsRefusesTheChange) {
                                           [&] {
                                             this->host.commit(this->replacement(
                                                 [](const CountingCore& core) -> double {
-                                                  if (core.runs == 5) throw std::runtime_error("division by zero");
+                                                  if (core.runs == 5)
+                                                    throw std::runtime_error("division by zero");
                                                   return 9.0;
                                                 },
                                                 this->within(0.25)));
@@ -252,11 +255,11 @@ TYPED_TEST(Bumpless, ACandidateThatFaultsRefusesTheChange) {
 TYPED_TEST(Bumpless, TheCandidateOfAShadowIsPromotedWithItsState) {
   Component& component = this->deploy_live([](const CountingCore&) { return 1.0; });
   Transaction begin;
-  begin.shadow("c",
-               this->make_core(
-                   "t/Next", [](const CountingCore& core) { return core.rounds % 30 == 29 ? 1.0 : 9.0; },
-                   &this->next),
-               {.budget_ns = s_to_ns(1)});
+  begin.shadow(
+      "c",
+      this->make_core(
+          "t/Next", [](const CountingCore& core) { return core.rounds % 30 == 29 ? 1.0 : 9.0; }, &this->next),
+      {.budget_ns = s_to_ns(1)});
   this->host.commit(std::move(begin));
   const auto promote = [&](double step, time_ns_t within_ns) {
     Transaction change;
@@ -326,13 +329,11 @@ TYPED_TEST(Bumpless, WhatCannotBeBoundedIsRefusedBeforeAnythingIsBuilt) {
   this->deploy_live([](const CountingCore&) { return 1.0; });
   const auto refused = [&](const BumplessOptions& options, const char* text) {
     std::string found;
-    EXPECT_EQ(ErrorCode::invalid_argument,
-              this->code_of(
-                  [&] {
-                    this->host.commit(
-                        this->replacement([](const CountingCore&) { return 1.0; }, options));
-                  },
-                  &found));
+    EXPECT_EQ(
+        ErrorCode::invalid_argument,
+        this->code_of(
+            [&] { this->host.commit(this->replacement([](const CountingCore&) { return 1.0; }, options)); },
+            &found));
     EXPECT_THAT(found, HasSubstr(text));
   };
   const auto with = [](const std::string& port, const std::string& field, double step) {
@@ -384,7 +385,8 @@ TYPED_TEST(Bumpless, APromotedCoreGoesOnWithTheStateOfTheOldOne) {
   const Law count = [](const CountingCore& core) { return core.count(); };
   const auto swap = [&](bool is_fresh) {
     Transaction begin;
-    begin.shadow("c", this->make_core("t/Next", count, &this->next), {.budget_ns = s_to_ns(1), .is_fresh = is_fresh});
+    begin.shadow("c", this->make_core("t/Next", count, &this->next),
+                 {.budget_ns = s_to_ns(1), .is_fresh = is_fresh});
     this->host.commit(std::move(begin));
     this->host.until([&] { return this->record().compared >= 5; }, "the candidate");
     Transaction end;
@@ -486,8 +488,9 @@ TEST(BumplessStop, AStopDoesNotWaitForNearOutputs) {
       code = error.code();
     }
   });
-  wait_until([&] { return !threads.host().shadows().empty() && threads.host().shadows().back().compared >= 3; },
-             "the candidate");
+  wait_until(
+      [&] { return !threads.host().shadows().empty() && threads.host().shadows().back().compared >= 3; },
+      "the candidate");
   threads.host().stop("c");
   EXPECT_EQ(ComponentState::stopped, component.task().state());
   requester.join();

@@ -68,8 +68,9 @@ struct CoreWithOptions {
 
 /// How the candidate of a shadow becomes the core.
 struct PromoteOptions {
-  std::optional<BumplessOptions> bumpless{};  // as in ReplaceOptions; its budget counts for nothing, the shadow has one
-  bool is_fresh{false};                       // it gets no copies of the state fields of the core that it replaces
+  std::optional<BumplessOptions>
+      bumpless{};        // as in ReplaceOptions; its budget counts for nothing, the shadow has one
+  bool is_fresh{false};  // it gets no copies of the state fields of the core that it replaces
 };
 
 /// A core to execute in a component's shadow: by the step's name, or as an object. Without a shell as an object, the registry makes
@@ -81,9 +82,9 @@ struct CoreInShadow {
 };
 
 /// What a step puts in, as its kind takes it.
-using StepValue =
-    std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>, std::unique_ptr<FsmBase>,
-                 std::unique_ptr<Shell>, NewComponent, NewResource, CoreWithOptions, PromoteOptions, CoreInShadow>;
+using StepValue = std::variant<std::monostate, PropertyValue, std::unique_ptr<CoreBase>,
+                               std::unique_ptr<FsmBase>, std::unique_ptr<Shell>, NewComponent, NewResource,
+                               CoreWithOptions, PromoteOptions, CoreInShadow>;
 
 struct StepKind;
 

@@ -173,7 +173,16 @@ class Commit {
     changed,    // a participant is STOPPING or FAULTED
     stale,      // the architecture is not the one that it was prepared for
   };
-  enum class Off : std::uint8_t { not_yet, timed_out, not_idle, not_ready, withdrawn, shut_down, preempted, abandoned };
+  enum class Off : std::uint8_t {
+    not_yet,
+    timed_out,
+    not_idle,
+    not_ready,
+    withdrawn,
+    shut_down,
+    preempted,
+    abandoned
+  };
 
   /// Actions without a task are checks: their adopt runs on the requester, before it posts.
   Commit(std::size_t participants, std::vector<CommitAction*> actions);

@@ -26,7 +26,7 @@ struct GreatestStep {
 struct BumplessOptions {
   std::vector<GreatestStep> outputs{};  // at least one
   time_ns_t within_ns{s_to_ns(2)};      // so long such an instant is waited for; 1 to kLongest
-  time_ns_t budget_ns{0};               // of the candidate, as ShadowOptions::budget_ns; 0: the component's period
+  time_ns_t budget_ns{0};  // of the candidate, as ShadowOptions::budget_ns; 0: the component's period
 };
 /// Throws Error (invalid_argument): a time or a step makes no sense, whatever the component's ports are. [non-rt]
 void check_options(const BumplessOptions& options, const std::string& component);
@@ -35,12 +35,12 @@ void check_options(const BumplessOptions& options, const std::string& component)
 struct OutputStep {
   static constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
-  std::string output{};             // "command.torque"
-  double greatest{0.0};             // as it was asked for
-  double difference{kUnknown};      // candidate minus live core, in the last release that was compared
-  double least{kUnknown};           // the smallest difference so far, without its sign
-  time_ns_t least_instant_ns{0};    // when that was
-  double step{kUnknown};            // the new core's first output minus the old core's last one
+  std::string output{};           // "command.torque"
+  double greatest{0.0};           // as it was asked for
+  double difference{kUnknown};    // candidate minus live core, in the last release that was compared
+  double least{kUnknown};         // the smallest difference so far, without its sign
+  time_ns_t least_instant_ns{0};  // when that was
+  double step{kUnknown};          // the new core's first output minus the old core's last one
 };
 
 /// | member         | written by                         | read by                   | order                               |

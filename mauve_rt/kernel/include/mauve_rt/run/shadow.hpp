@@ -167,9 +167,7 @@ class Shadow {
   /// It was promoted, and a listed output of the new core is yet to be measured. [rt], any thread
   bool awaits_outputs() const MAUVE_RT { return awaits_outputs_.load(std::memory_order_acquire); }
   /// It has ended, and the component's ports still refer to it. [rt], any thread
-  bool is_to_settle() const MAUVE_RT {
-    return has_ended() && capture_.is_attached() && !awaits_outputs();
-  }
+  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached() && !awaits_outputs(); }
 
   // ---- who executes: the shadow's thread, or a simulation
 
