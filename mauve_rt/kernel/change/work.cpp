@@ -239,7 +239,8 @@ void TransactionCommit::Work::draft_steps() {
   }
   for (const DraftComponent& component : draft_->components()) {
     if (!options_.idle || !component.bumpless) continue;
-    throw Error(ErrorCode::invalid_argument, "a bumpless change waits for near outputs, not for an idle instant",
+    throw Error(ErrorCode::invalid_argument,
+                "a bumpless change waits for near outputs, not for an idle instant",
                 {.component = component.name(),
                  .element = "idle",
                  .remedy = "leave out `idle` or `bumpless`",
@@ -449,8 +450,9 @@ void TransactionCommit::Work::throw_if_not_near(const Change& change) const {
                      .element = "bumpless",
                      .expected = {},
                      .found = has_ended ? record.reason : std::string{},
-                     .remedy = has_ended ? "correct the candidate; nothing was changed"
-                                         : "allow a greater step or more time (within_s), or hand over more state",
+                     .remedy = has_ended
+                                   ? "correct the candidate; nothing was changed"
+                                   : "allow a greater step or more time (within_s), or hand over more state",
                      .step = change.draft->core_step,
                      .step_name = text_of(change.draft->core_step)};
   for (const OutputStep& output : record.steps) {
@@ -464,8 +466,8 @@ void TransactionCommit::Work::throw_if_not_near(const Change& change) const {
                                std::to_string(output.least_instant_ns) + " ns");
   }
   if (has_ended)
-    throw Error(ErrorCode::adopt_refused, "the candidate ended before its outputs were near those of the core",
-                detail);
+    throw Error(ErrorCode::adopt_refused,
+                "the candidate ended before its outputs were near those of the core", detail);
   detail.found += "; " + std::to_string(record.compared) + " of " + std::to_string(record.releases) +
                   " releases compared";
   throw Error(ErrorCode::timeout,
@@ -524,7 +526,9 @@ void TransactionCommit::Work::renew_fallback(Change& change) {
 /// A shadow that begins has the properties that the same change sets.
 void TransactionCommit::Work::settle_shadow(const DraftComponent& changed) {
   Component& component = *changed.component;
-  component.settle_shadow();  // the take may have ended it
+  // The take may have ended it. The curves of a candidate that went in go on.
+  if (const auto before = component.last_shadow(); before == nullptr || !before->measures_outputs())
+    component.settle_shadow();
   if (changed.shadow != nullptr) component.keep_shadow(changed.shadow);
   const auto shadow = component.last_shadow();
   if (shadow == nullptr) return;

@@ -25,12 +25,9 @@ std::string name_of(const GreatestStep& output) {
 void check_options(const BumplessOptions& options, const std::string& component) {
   const auto refuse = [&](const char* what, const std::string& element, const std::string& expected,
                           const std::string& found, const char* remedy) {
-    throw Error(ErrorCode::invalid_argument, what,
-                {.component = component,
-                 .element = element,
-                 .expected = expected,
-                 .found = found,
-                 .remedy = remedy});
+    throw Error(
+        ErrorCode::invalid_argument, what,
+        {.component = component, .element = element, .expected = expected, .found = found, .remedy = remedy});
   };
   if (options.within_ns <= 0 || options.within_ns > kLongest)
     refuse("a change cannot wait that long for near outputs", "within_s",
@@ -77,7 +74,8 @@ OutputSteps::OutputSteps(const Shell& shell, const std::string& component,
              "a field of " + port.type() + " that is a number, not in a text or a list whose length changes",
              output.field.empty() ? "no field" : output.field, "name the field of a number");
     const auto& ports = shell.ports();
-    const auto its = std::find_if(ports.begin(), ports.end(), [&](const auto& each) { return each.get() == &port; });
+    const auto its =
+        std::find_if(ports.begin(), ports.end(), [&](const auto& each) { return each.get() == &port; });
     next->output = name_of(output);
     next->port = static_cast<std::size_t>(its - ports.begin());
     next->place = place.value_or(NumberPlace{});
@@ -97,12 +95,16 @@ void OutputSteps::note(std::size_t port, const void* live, const void* candidate
 bool OutputSteps::compare(time_ns_t instant_ns) {
   bool are_near = true;
   for (One& each : all_) {
-    const double difference = std::abs(each.candidate - each.live);  // NaN where one of them is, or is unknown
+    each.compared[compared_ % kCurve] = {
+        .instant_ns = instant_ns, .live = each.live, .candidate = each.candidate};
+    const double difference =
+        std::abs(each.candidate - each.live);  // NaN where one of them is, or is unknown
     are_near &= difference <= each.greatest;
     if (std::isnan(difference) || difference >= each.least) continue;  // NaN >= nothing
     each.least = difference;
     each.least_instant_ns = instant_ns;
   }
+  ++compared_;
   return are_near;
 }
 
@@ -122,6 +124,27 @@ std::vector<OutputStep> OutputSteps::shown() const {
                      .step = each.step.load(std::memory_order_relaxed)});
   }
   return shown;
+}
+
+std::vector<OutputCurve> OutputSteps::curves() const {
+  std::vector<OutputCurve> curves;
+  for (const One& each : all_) {
+    OutputCurve& curve = curves.emplace_back();
+    curve.output = each.output;
+    curve.instant_ns = instant_ns_.load(std::memory_order_relaxed);
+    for (std::size_t number = compared_ - std::min(compared_, kCurve); number < compared_; ++number) {
+      const Compared& release = each.compared[number % kCurve];
+      curve.instants_ns.push_back(release.instant_ns);
+      curve.live.push_back(release.live);
+      curve.candidate.push_back(release.candidate);
+    }
+    const std::size_t count = each.news_count.load(std::memory_order_acquire);
+    for (std::size_t number = 0; number < count; ++number) {
+      curve.new_instants_ns.push_back(each.news[number].instant_ns);
+      curve.new_core.push_back(each.news[number].number);
+    }
+  }
+  return curves;
 }
 
 }  // namespace mauve

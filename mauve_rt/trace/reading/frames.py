@@ -104,6 +104,9 @@ def decisions(trace: Trace) -> pd.DataFrame:
     return pd.DataFrame(columns).astype(kinds | words)
 
 
+_PARTS_OF_SHADOWS = ("outputs", "steps", "curves")
+
+
 def shadows(trace: Trace) -> pd.DataFrame:
     """Reports of shadows, a row per number: the fields of `Shadow` and of `ShadowOutput`.
 
@@ -111,7 +114,7 @@ def shadows(trace: Trace) -> pd.DataFrame:
     """
     found = [(one, output) for one in trace.shadow_reports for output in one.outputs]
     of_output = [field.name for field in fields(ShadowOutput)]
-    of_shadow = [field.name for field in fields(Shadow) if field.name not in (*of_output, "outputs", "steps")]
+    of_shadow = [field.name for field in fields(Shadow) if field.name not in {*of_output, *_PARTS_OF_SHADOWS}]
     columns = {name: [getattr(one, name) for one, _ in found] for name in of_shadow}
     columns |= {name: [getattr(output, name) for _, output in found] for name in of_output}
     words = ("component", "core", "live_core", "verdict", "reason", "port", "field")
