@@ -101,6 +101,11 @@ class OutputCurve:
     new_core: tuple[float, ...]
     """Written by the new core in these releases."""
 
+    def points(self, series: str) -> list[tuple[int, float]]:
+        """Return the instants and numbers of live, candidate or new_core."""
+        instants_ns = self.new_instants_ns if series == "new_core" else self.instants_ns
+        return list(zip(instants_ns, getattr(self, series), strict=True))
+
     @classmethod
     def of_message(cls, message: Any) -> Self:
         """Take it from a mauve_msgs/msg/OutputCurve, of whichever library."""

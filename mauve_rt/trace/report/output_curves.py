@@ -75,9 +75,7 @@ def _figure(one: Shadow, step: OutputStep, curve: OutputCurve) -> str:
 
 
 def _drawing(step: OutputStep, curve: OutputCurve, described: str) -> str:
-    before = _finite(curve.instants_ns, curve.live)
-    candidate = _finite(curve.instants_ns, curve.candidate)
-    after = _finite(curve.new_instants_ns, curve.new_core)
+    before, candidate, after = (_finite(curve.points(name)) for name in ("live", "candidate", "new_core"))
     zero_ns = curve.instant_ns or curve.instants_ns[-1]
     plane = _plane([*before, *candidate, *after], zero_ns, before[-1:], step.greatest)
     parts = [_band(plane, before[-1:], step.greatest), *_axes(plane, zero_ns)]
@@ -106,8 +104,8 @@ def _plane(points: _Points, zero_ns: int, last: _Points, greatest: float) -> _Pl
     return _Plane(min(instants), max(*instants, zero_ns), low - margin, high + margin)
 
 
-def _finite(instants_ns: Sequence[int], numbers: Sequence[float]) -> _Points:
-    return [pair for pair in zip(instants_ns, numbers, strict=True) if math.isfinite(pair[1])]
+def _finite(points: _Points) -> _Points:
+    return [point for point in points if math.isfinite(point[1])]
 
 
 def _line(plane: _Plane, points: _Points) -> str:
