@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// A pendulum, and two controllers that hold it at an angle: one without an integral, one with.
+// A pendulum, and two controllers that hold it at an angle: one swings for seconds, one does not.
 #pragma once
 
 #include <cmath>
@@ -77,16 +77,16 @@ class AngleController : public mauve::Core<AngleControllerShell> {
 
 class SoftController final : public AngleController {
  protected:
-  double gain() const noexcept override { return 8.0; }
-  double integral_gain() const noexcept override { return 4.0; }
-  double damping() const noexcept override { return 2.0; }
+  double gain() const noexcept override { return 4.0; }
+  double integral_gain() const noexcept override { return 16.0; }
+  double damping() const noexcept override { return 6.0; }
 };
 
 class FirmController final : public AngleController {
  protected:
   double gain() const noexcept override { return 40.0; }
   double integral_gain() const noexcept override { return 60.0; }
-  double damping() const noexcept override { return 4.0; }
+  double damping() const noexcept override { return 8.0; }
 };
 
 struct AngleControllerFsm : mauve::Fsm<AngleControllerShell, AngleController> {

@@ -64,14 +64,15 @@ def output_curves(shadows: Sequence[Shadow]) -> str:
 
 
 def _figure(one: Shadow, step: OutputStep, curve: OutputCurve) -> str:
-    asked = f"at most {number_text(step.greatest)} asked for"
     if curve.instant_ns is None:
-        told = f"not swapped: least difference {number_text(step.least)}, {asked}"
+        told = f"not swapped, least difference {number_text(step.least)}"
     else:
-        told = f"step {_signed(step.step)} at T; difference before it {_signed(step.difference)}, {asked}"
+        told = f"step {_signed(step.step)}, difference {_signed(step.difference)}"
+    told += f" (at most {number_text(step.greatest)})"
     name = f"{one.component} {curve.output}"
+    caption = f"<figcaption>{escape(name)} <small>{escape(one.core)}</small></figcaption>"
     drawing = _drawing(step, curve, f"{name}: {told}")
-    return f"<figure><figcaption>{escape(name)}</figcaption>{drawing}<small>{escape(told)}</small></figure>"
+    return f"<figure>{caption}{drawing}<small>{escape(told)}</small></figure>"
 
 
 def _drawing(step: OutputStep, curve: OutputCurve, described: str) -> str:

@@ -35,7 +35,8 @@ def shadows_section(analysis: Analysis) -> Section | None:
         "Skipped: late, as the shadow's thread was late; budget, to stay within the budget. "
         "Lag: releases by which the candidate's first number of the port is later. "
         "Step: the new core's first output minus the old core's last one. "
-        "T: the component runs with the new core from then on. "
+        "T: the component runs with the new core from then on; without a swap, 0 ms is the last release "
+        "that was compared. "
         "Verdict running: the shadow ran when the recording ended.",
         anchor="shadows",
     )
