@@ -236,13 +236,8 @@ def test_the_report_draws_an_output_over_the_swap_with_its_bound(trace: Trace) -
     )
     assert height == pytest.approx(per_unit, abs=0.1), "0.5 below and above"
     assert top + height / 2 == pytest.approx(before[-1][1], abs=0.1), "around the last output of the old core"
-    for words in (
-        ">T<",
-        "ms</text>",
-        "step +0.5 at T",
-        "at most 0.5 asked for",
-        "last of the core before: 1.5",
-    ):
+    told = "step +0.5, difference +0.25 (at most 0.5)"
+    for words in (">T<", "ms</text>", told, "last of the core before: 1.5"):
         assert words in html, words
 
 
