@@ -13,8 +13,9 @@ using Scalar = mauve::types::Float64;
 inline constexpr double kSamplePeriodS = 1e-3;
 
 struct PendulumShell : mauve::Shell {
-  mauve::ReadPort<Scalar>& torque = read_port<Scalar>("torque");   // Nm
+  mauve::ReadPort<Scalar>& torque = read_port<Scalar>("torque");  // Nm
   mauve::WritePort<Scalar>& angle = write_port<Scalar>("angle");  // rad; 0: it hangs
+  mauve::WritePort<Scalar>& speed = write_port<Scalar>("speed");  // rad/s
 };
 
 /// 1 kg at 0.5 m, with some friction.
@@ -27,6 +28,7 @@ class Pendulum final : public mauve::Core<PendulumShell> {
     speed_ += kSamplePeriodS * torque / (kMass * kLength * kLength);
     angle_ += kSamplePeriodS * speed_;
     shell().angle.write({.data = angle_});
+    shell().speed.write({.data = speed_});
   }
 
  private:
@@ -49,6 +51,7 @@ struct AngleControllerShell : mauve::Shell {
   mauve::Property<double>& target =
       property("target", 0.8, {.unit = "rad", .minimum = -1.5, .maximum = 1.5});
   mauve::ReadPort<Scalar>& angle = read_port<Scalar>("angle");
+  mauve::ReadPort<Scalar>& speed = read_port<Scalar>("speed");
   mauve::WritePort<Scalar>& torque = write_port<Scalar>("torque");
 };
 
@@ -56,12 +59,10 @@ struct AngleControllerShell : mauve::Shell {
 class AngleController : public mauve::Core<AngleControllerShell> {
  public:
   void control() {
-    const double angle = shell().angle.read().value.data;
-    const double error = shell().target.value() - angle;
+    const double error = shell().target.value() - shell().angle.read().value.data;
     integral_nm_ += integral_gain() * error * kSamplePeriodS;
-    const double speed = (angle - angle_before_) / kSamplePeriodS;
-    angle_before_ = angle;
-    shell().torque.write({.data = gain() * error + integral_nm_ - damping() * speed});
+    const double braking = damping() * shell().speed.read().value.data;
+    shell().torque.write({.data = gain() * error + integral_nm_ - braking});
   }
 
  protected:
@@ -70,9 +71,8 @@ class AngleController : public mauve::Core<AngleControllerShell> {
   virtual double damping() const noexcept = 0;        // Nm s/rad
 
  private:
-  MAUVE_STATE(integral_nm_, angle_before_)
+  MAUVE_STATE(integral_nm_)
   double integral_nm_{0.0};
-  double angle_before_{0.0};
 };
 
 class SoftController final : public AngleController {
