@@ -10,6 +10,7 @@ from mauve_rt.interfaces.descriptions import shadow_message
 from mauve_rt.trace.bag.recorded import SentMessage
 
 _PERIOD_NS = 1_000_000_000
+_PERIOD_AFTER_END_NS = 200_000_000
 
 
 class _Recorded(NamedTuple):
@@ -22,8 +23,8 @@ class RecordedShadows:
     """A source of messages for a recorder. All but `finish` for one thread.
 
     A shadow that runs has a message once a second, and one more after its end. While the curves of its
-    outputs go on after that, one more a second at most. A shadow that ends and is replaced between two calls
-    of take_messages() has no message after its end.
+    outputs go on after that, it has five a second at most. A shadow that ends and is replaced between two
+    calls of take_messages() has no message after its end.
     """
 
     def __init__(self, runtime: Runtime, node_name: str, serialize: Callable[[Any], bytes]) -> None:
@@ -79,7 +80,9 @@ class RecordedShadows:
             return True
         now, then = one.message, before.message
         goes_on = (now.begin_ns, now.verdict) == (then.begin_ns, then.verdict) and not self._is_finishing
-        if goes_on and (now.verdict == Shadow.RUNNING or one.time_ns < before.time_ns + _PERIOD_NS):
-            return one.time_ns >= before.time_ns + _PERIOD_NS
+        is_running = now.verdict == Shadow.RUNNING
+        period_ns = _PERIOD_NS if is_running else _PERIOD_AFTER_END_NS
+        if goes_on and (is_running or one.time_ns < before.time_ns + period_ns):
+            return one.time_ns >= before.time_ns + period_ns
         # After the end its thread may complete a release, and the curves go on. As bytes: NaN equals NaN.
         return one.data != before.data
