@@ -70,7 +70,8 @@ def _figure(one: Shadow, step: OutputStep, curve: OutputCurve) -> str:
         told = f"step {_signed(step.step)}, difference {_signed(step.difference)}"
     told += f" (at most {number_text(step.greatest)})"
     name = f"{one.component} {curve.output}"
-    caption = f"<figcaption>{escape(name)} <small>{escape(one.core.rpartition("/")[2])}</small></figcaption>"
+    core = escape(one.core.rpartition("/")[2])
+    caption = f"<figcaption>{escape(name)} <small>{core}</small></figcaption>"
     drawing = _drawing(step, curve, f"{name}: {told}")
     return f"<figure>{caption}{drawing}<small>{escape(told)}</small></figure>"
 
