@@ -112,8 +112,11 @@ class OutputCurve:
         return cls(
             output=message.output,
             instant_ns=int(message.instant_ns) or None,
-            **{name: tuple(map(int, getattr(message, name))) for name in ("instants_ns", "new_instants_ns")},
-            **{name: tuple(map(float, getattr(message, name))) for name in ("live", "candidate", "new_core")},
+            instants_ns=tuple(map(int, message.instants_ns)),
+            live=tuple(map(float, message.live)),
+            candidate=tuple(map(float, message.candidate)),
+            new_instants_ns=tuple(map(int, message.new_instants_ns)),
+            new_core=tuple(map(float, message.new_core)),
         )
 
 
