@@ -23,8 +23,8 @@ class Pendulum final : public mauve::Core<PendulumShell> {
  public:
   void move() {
     constexpr double kMass = 1.0, kLength = 0.5, kGravity = 9.81, kFriction = 0.2;
-    const double torque = shell().torque.read().value.data - kFriction * speed_ -
-                          kMass * kGravity * kLength * std::sin(angle_);
+    const double torque =
+        shell().torque.read().value.data - kFriction * speed_ - kMass * kGravity * kLength * std::sin(angle_);
     speed_ += kSamplePeriodS * torque / (kMass * kLength * kLength);
     angle_ += kSamplePeriodS * speed_;
     shell().angle.write({.data = angle_});
@@ -48,8 +48,7 @@ struct PendulumFsm : mauve::Fsm<PendulumShell, Pendulum> {
 };
 
 struct AngleControllerShell : mauve::Shell {
-  mauve::Property<double>& target =
-      property("target", 0.8, {.unit = "rad", .minimum = -1.5, .maximum = 1.5});
+  mauve::Property<double>& target = property("target", 0.8, {.unit = "rad", .minimum = -1.5, .maximum = 1.5});
   mauve::ReadPort<Scalar>& angle = read_port<Scalar>("angle");
   mauve::ReadPort<Scalar>& speed = read_port<Scalar>("speed");
   mauve::WritePort<Scalar>& torque = write_port<Scalar>("torque");

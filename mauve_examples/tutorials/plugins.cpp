@@ -17,5 +17,6 @@ MAUVE_PLUGINS(registry) {
   registry.shell<AngleControllerShell>("mauve_examples/AngleControllerShell");
   registry.core<SoftController>("mauve_examples/SoftController", "mauve_examples/AngleControllerShell");
   registry.core<FirmController>("mauve_examples/FirmController", "mauve_examples/AngleControllerShell");
-  registry.fsm<AngleControllerFsm>("mauve_examples/AngleControllerFsm", "mauve_examples/AngleControllerShell");
+  registry.fsm<AngleControllerFsm>("mauve_examples/AngleControllerFsm",
+                                   "mauve_examples/AngleControllerShell");
 }
