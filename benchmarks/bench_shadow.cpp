@@ -4,9 +4,13 @@
 //   bench_shadow [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0] [--turns 10] [--releases 50]
 // Prints {"read_ps": [...], "tapped_read_ps": [...], "write_ps": [...], "tapped_write_ps": [...], "watched_write_ps": [...],
 // "limited_write_ps": [...], "capture_ps": [...]} in picoseconds a call, of values of 16 bytes. A deployed 1 kHz component that reads and writes once a
-// release follows, with {"plain_ns": [...], "shadowed_ns": [...], "waking_ns": [...], "probation_ns": [...]}: CPU time of the
-// component's thread from one release to the next. "waking" has no shadow, and wakes a sleeping ordinary thread in each release.
-// "releases" and "compared": of the releases with a shadow, those that the candidate executed.
+// release follows, with {"plain_ns": [...], "shadowed_ns": [...], "awaiting_ns": [...], "waking_ns": [...], "probation_ns": [...]}:
+// CPU time of the component's thread from one release to the next. "awaiting": a bumpless change waits for near outputs. "waking" has
+// no shadow, and wakes a sleeping ordinary thread in each release. "releases" and "compared": of the releases with a shadow, those
+// that the candidate executed.
+// Then the component has a neighbour of 1 kHz on its CPU, of the next lower priority. {"neighbour_plain_ns": [...],
+// "neighbour_awaiting_ns": [...]}: the neighbour's wake-up latencies; {"blackout_ns": [...], "bumpless_blackout_ns": [...]}: of
+// changes of the core, plain and bumpless, by turns.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -162,6 +166,14 @@ struct Passing : bench::Worker {
   }
 };
 
+/// Never near a passing one.
+struct Far : Passing {
+  void work() override {
+    auto& pipe = static_cast<PipeShell&>(shell());
+    pipe.output.write({pipe.input.read().value.first + 2, 0});
+  }
+};
+
 struct Timed : Passing {
   void work() override {
     if (times != nullptr) times->note();
@@ -246,27 +258,62 @@ mauve::Transaction put_on_probation() {
   return transaction;
 }
 
+mauve::Transaction put_in_near(std::unique_ptr<mauve::CoreBase> core, double greatest) {
+  mauve::Transaction transaction;
+  transaction.replace_core(
+      "pipe", std::move(core),
+      mauve::ReplaceOptions{.bumpless = mauve::BumplessOptions{.outputs = {{"output", "first", greatest}},
+                                                               .within_ns = mauve::s_to_ns(100)}});
+  return transaction;
+}
+
+/// Calls the function while a bumpless change waits for outputs that never come near.
+template <typename Function>
+void while_waiting(mauve::Deployer& deployer, const Function& measure) {
+  std::thread requester([&] {
+    try {
+      deployer.commit(put_in_near(std::make_unique<Far>(), 0.0), {});
+    } catch (const mauve::Error&) {  // called off
+    }
+  });
+  const auto has_begun = [&] {
+    const auto shadows = deployer.shadows();
+    return !shadows.empty() && shadows.back().verdict == mauve::ShadowVerdict::running &&
+           shadows.back().compared > 0;
+  };
+  while (!has_begun()) bench::sleep_until(mauve::monotonic_now_ns() + mauve::ms_to_ns(1));
+  measure();
+  deployer.stop("pipe");  // a stop calls the change off
+  requester.join();
+  deployer.start("pipe");
+}
+
+mauve::Component& add_pipe(mauve::Architecture& architecture, const bench::Options& options) {
+  architecture.add_resource<mauve::SharedData<Small>>("data");
+  mauve::Component& component = architecture.add_component<PipeShell, Timed, bench::WorkerFsm>(
+      "pipe", mauve::TaskSettings{.priority = options.priority(), .cpus = {options.cpu()}});
+  component.set_property("period_us", kPeriodUs);
+  architecture.connect("pipe", "input", "data", "read");
+  architecture.connect("pipe", "output", "data", "write");
+  return component;
+}
+
 void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   const std::int64_t turns = options.number("turns", 10);
   const std::int64_t count = options.number("releases", 50);
   Sleeper sleeper;  // outlives the cores
   CpuTimes times(static_cast<std::size_t>(20 * turns * (count + 100)));
   mauve::Architecture architecture;
-  architecture.add_resource<mauve::SharedData<Small>>("data");
-  mauve::Component& component = architecture.add_component<PipeShell, Timed, bench::WorkerFsm>(
-      "pipe", mauve::TaskSettings{.priority = options.priority(), .cpus = {options.cpu()}});
-  component.set_property("period_us", kPeriodUs);
   auto first = std::make_unique<Timed>();
   first->times = &times;
-  component.replace_core(std::move(first));
-  architecture.connect("pipe", "input", "data", "read");
-  architecture.connect("pipe", "output", "data", "write");
+  add_pipe(architecture, options).replace_core(std::move(first));
   architecture.configure();
   mauve::Deployer deployer(architecture);
   deployer.deploy();
 
   std::vector<std::int64_t> plain;
   std::vector<std::int64_t> shadowed;
+  std::vector<std::int64_t> awaiting;
   std::vector<std::int64_t> waking;
   std::vector<std::int64_t> probation;
   std::int64_t releases = 0;
@@ -279,6 +326,7 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
     const mauve::ShadowRecord record = deployer.shadows().back();
     releases += record.releases;
     compared += record.compared;
+    while_waiting(deployer, [&] { times.collect(awaiting, count); });
     deployer.commit(put_in(std::make_unique<Waking>(sleeper)), {});
     times.collect(waking, count);
     deployer.commit(put_on_probation(), {});
@@ -288,16 +336,54 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   deployer.shutdown();
   line.add("plain_ns", plain)
       .add("shadowed_ns", shadowed)
+      .add("awaiting_ns", awaiting)
       .add("waking_ns", waking)
       .add("probation_ns", probation)
       .add("releases", releases)
       .add("compared", compared);
 }
 
+void measure_changes(const bench::Options& options, bench::JsonLine& line) {
+  constexpr std::uint16_t kNeighbour = 1;
+  constexpr int kChanges = 5;  // in each turn
+  const time_ns_t long_ns = mauve::us_to_ns(kPeriodUs) * options.number("releases", 50);
+  mauve::Architecture architecture;
+  add_pipe(architecture, options);
+  bench::add_worker(architecture, "neighbour", options.priority() - 1, options.cpu(), kPeriodUs, 0);
+  architecture.configure();
+  mauve::Deployer deployer(architecture);
+  deployer.deploy();
+  const auto collect = [&](std::vector<std::int64_t>& latencies) {
+    deployer.drain_trace();
+    bench::sleep_until(mauve::monotonic_now_ns() + long_ns);
+    std::vector<mauve::TraceRecord> releases;
+    bench::append_records(releases, deployer.drain_trace(), mauve::TraceKind::release, kNeighbour);
+    for (const mauve::TraceRecord& release : releases) latencies.push_back(release.b - release.a);
+  };
+  std::vector<std::int64_t> plain;
+  std::vector<std::int64_t> awaiting;
+  std::vector<std::int64_t> blackouts;
+  std::vector<std::int64_t> bumpless;
+  for (std::int64_t turn = 0; turn < options.number("turns", 10); ++turn) {
+    collect(plain);
+    while_waiting(deployer, [&] { collect(awaiting); });
+    for (int change = 0; change < kChanges; ++change) {
+      blackouts.push_back(deployer.commit(put_in(std::make_unique<Passing>()), {}).blackout_ns);
+      bumpless.push_back(deployer.commit(put_in_near(std::make_unique<Passing>(), kMost), {}).blackout_ns);
+    }
+  }
+  deployer.shutdown();
+  line.add("neighbour_plain_ns", plain)
+      .add("neighbour_awaiting_ns", awaiting)
+      .add("blackout_ns", blackouts)
+      .add("bumpless_blackout_ns", bumpless);
+}
+
 void measure(const bench::Options& options) {
   bench::JsonLine line;
   measure_ports(options, line);
   measure_releases(options, line);
+  measure_changes(options, line);
   line.print();
 }
 

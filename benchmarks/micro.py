@@ -12,7 +12,7 @@ from settings import Settings
 _PS_PER_NS = 1000
 _NS_PER_US = 1000
 _PACE_NS = 1000
-_RELEASES = ("plain", "shadowed", "waking", "probation")
+_RELEASES = ("plain", "shadowed", "awaiting", "waking", "probation")
 _SHADOW_US = 5.0  # 0.5 % of the period; most of it is the system call that wakes the shadow's thread
 _LOOKUP_NS_PER_HOP = 1000
 _ONE_CPU = "this machine has one CPU"
@@ -175,6 +175,7 @@ def shadow_rows(settings: Settings) -> Iterator[Row]:
     yield alone(what, added, unit="us", limit=_SHADOW_US, note=note)
     whats = {
         "shadowed": "with a shadow",
+        "awaiting": "while a bumpless change waits for near outputs",
         "waking": "that wakes a sleeping ordinary thread, without a shadow",
         "probation": "on probation with an output limit",
     }
@@ -184,6 +185,19 @@ def shadow_rows(settings: Settings) -> Iterator[Row]:
             [(each[name], each["plain"]) for each in medians],
             unit="us",
             beside="the same component without",
+        )
+    for percent in (50, 99):
+        yield compared(
+            f"wake-up latency of a neighbour on the CPU while a bumpless change waits, p{percent}",
+            _us_pairs(rounds, "neighbour_awaiting_ns", "neighbour_plain_ns", percent),
+            unit="us",
+            beside="the same neighbour without",
+        )
+        yield compared(
+            f"bumpless change of a core that is near at once, blackout p{percent}",
+            _us_pairs(rounds, "bumpless_blackout_ns", "blackout_ns", percent),
+            unit="us",
+            beside="a plain change between the same cores",
         )
 
 
@@ -201,6 +215,15 @@ def _rounds(program: str, settings: Settings, **options: int) -> list[dict[str, 
     """A process a round; within it the sides take turns."""
     place = {"priority": settings.priority, "cpu": settings.cpu, **options}
     return [native.run(program, **place) for _ in range(settings.rounds)]
+
+
+def _us_pairs(
+    rounds: Sequence[dict[str, Any]], name: str, reference: str, percent: float
+) -> list[tuple[float, float]]:
+    return [
+        (percentile(found[name], percent) / _NS_PER_US, percentile(found[reference], percent) / _NS_PER_US)
+        for found in rounds
+    ]
 
 
 def _other_cpu(settings: Settings) -> int:

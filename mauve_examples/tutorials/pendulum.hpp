@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// A pendulum, and two controllers that hold it at an angle: one without an integral, one with.
+// A pendulum, and two controllers that hold it at an angle: one swings for seconds, one does not.
 #pragma once
 
 #include <cmath>
@@ -15,6 +15,7 @@ inline constexpr double kSamplePeriodS = 1e-3;
 struct PendulumShell : mauve::Shell {
   mauve::ReadPort<Scalar>& torque = read_port<Scalar>("torque");  // Nm
   mauve::WritePort<Scalar>& angle = write_port<Scalar>("angle");  // rad; 0: it hangs
+  mauve::WritePort<Scalar>& speed = write_port<Scalar>("speed");  // rad/s
 };
 
 /// 1 kg at 0.5 m, with some friction.
@@ -27,6 +28,7 @@ class Pendulum final : public mauve::Core<PendulumShell> {
     speed_ += kSamplePeriodS * torque / (kMass * kLength * kLength);
     angle_ += kSamplePeriodS * speed_;
     shell().angle.write({.data = angle_});
+    shell().speed.write({.data = speed_});
   }
 
  private:
@@ -48,6 +50,7 @@ struct PendulumFsm : mauve::Fsm<PendulumShell, Pendulum> {
 struct AngleControllerShell : mauve::Shell {
   mauve::Property<double>& target = property("target", 0.8, {.unit = "rad", .minimum = -1.5, .maximum = 1.5});
   mauve::ReadPort<Scalar>& angle = read_port<Scalar>("angle");
+  mauve::ReadPort<Scalar>& speed = read_port<Scalar>("speed");
   mauve::WritePort<Scalar>& torque = write_port<Scalar>("torque");
 };
 
@@ -55,12 +58,10 @@ struct AngleControllerShell : mauve::Shell {
 class AngleController : public mauve::Core<AngleControllerShell> {
  public:
   void control() {
-    const double angle = shell().angle.read().value.data;
-    const double error = shell().target.value() - angle;
+    const double error = shell().target.value() - shell().angle.read().value.data;
     integral_nm_ += integral_gain() * error * kSamplePeriodS;
-    const double speed = (angle - angle_before_) / kSamplePeriodS;
-    angle_before_ = angle;
-    shell().torque.write({.data = gain() * error + integral_nm_ - damping() * speed});
+    const double braking = damping() * shell().speed.read().value.data;
+    shell().torque.write({.data = gain() * error + integral_nm_ - braking});
   }
 
  protected:
@@ -69,23 +70,22 @@ class AngleController : public mauve::Core<AngleControllerShell> {
   virtual double damping() const noexcept = 0;        // Nm s/rad
 
  private:
-  MAUVE_STATE(integral_nm_, angle_before_)
+  MAUVE_STATE(integral_nm_)
   double integral_nm_{0.0};
-  double angle_before_{0.0};
 };
 
 class SoftController final : public AngleController {
  protected:
-  double gain() const noexcept override { return 8.0; }
-  double integral_gain() const noexcept override { return 4.0; }
-  double damping() const noexcept override { return 2.0; }
+  double gain() const noexcept override { return 4.0; }
+  double integral_gain() const noexcept override { return 16.0; }
+  double damping() const noexcept override { return 6.0; }
 };
 
 class FirmController final : public AngleController {
  protected:
   double gain() const noexcept override { return 40.0; }
   double integral_gain() const noexcept override { return 60.0; }
-  double damping() const noexcept override { return 4.0; }
+  double damping() const noexcept override { return 8.0; }
 };
 
 struct AngleControllerFsm : mauve::Fsm<AngleControllerShell, AngleController> {

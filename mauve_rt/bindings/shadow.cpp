@@ -32,6 +32,15 @@ void bind_output_steps(py::module_& module) {
       .def_readonly("least", &OutputStep::least)
       .def_readonly("least_instant_ns", &OutputStep::least_instant_ns)
       .def_readonly("step", &OutputStep::step, "NaN until it is known.");
+  py::class_<OutputCurve>(module, "OutputCurve",
+                          "One output around a bumpless change; fields as mauve_msgs/msg/OutputCurve.")
+      .def_readonly("output", &OutputCurve::output)
+      .def_readonly("instant_ns", &OutputCurve::instant_ns)
+      .def_readonly("instants_ns", &OutputCurve::instants_ns)
+      .def_readonly("live", &OutputCurve::live)
+      .def_readonly("candidate", &OutputCurve::candidate)
+      .def_readonly("new_instants_ns", &OutputCurve::new_instants_ns)
+      .def_readonly("new_core", &OutputCurve::new_core);
 }
 
 void bind_shadow(py::module_& module) {
@@ -72,7 +81,8 @@ void bind_shadow(py::module_& module) {
       .def_readonly("budget_ns", &ShadowRecord::budget_ns)
       .def_readonly("largest_execution_ns", &ShadowRecord::largest_execution_ns)
       .def_readonly("outputs", &ShadowRecord::outputs)
-      .def_readonly("steps", &ShadowRecord::steps, "Of a bumpless change.");
+      .def_readonly("steps", &ShadowRecord::steps, "Of a bumpless change.")
+      .def_readonly("curves", &ShadowRecord::curves, "Of the same outputs.");
 }
 
 }  // namespace mauve::bindings

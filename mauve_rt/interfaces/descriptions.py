@@ -9,6 +9,7 @@ from mauve_msgs.msg import (
     ComponentInfo,
     ComponentStatus,
     JobBound,
+    OutputCurve,
     PortInfo,
     Probation,
     RealtimeStatus,
@@ -37,6 +38,7 @@ from mauve_rt._kernel import (
     ShadowRecord,
     SlewRecord,
 )
+from mauve_rt._kernel import OutputCurve as OutputCurveRecord
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
@@ -296,8 +298,8 @@ def _probation(record: ProbationRecord) -> Any:
     )
 
 
-def shadow_message(record: ShadowRecord) -> Any:
-    """Shadow as the kernel describes it."""
+def shadow_message(record: ShadowRecord, *, curves: bool = False) -> Any:
+    """Shadow as the kernel describes it; with `curves` of its outputs, 2.5 kB each."""
     return Shadow(
         component=record.component,
         core=record.core,
@@ -332,6 +334,19 @@ def shadow_message(record: ShadowRecord) -> Any:
             for number in output.numbers
         ],
         steps=[output_step(step) for step in record.steps],
+        curves=[_output_curve(curve) for curve in record.curves] if curves else [],
+    )
+
+
+def _output_curve(curve: OutputCurveRecord) -> Any:
+    return OutputCurve(
+        output=curve.output,
+        instant_ns=curve.instant_ns,
+        instants_ns=curve.instants_ns,
+        live=curve.live,
+        candidate=curve.candidate,
+        new_instants_ns=curve.new_instants_ns,
+        new_core=curve.new_core,
     )
 
 

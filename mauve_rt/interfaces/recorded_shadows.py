@@ -10,18 +10,21 @@ from mauve_rt.interfaces.descriptions import shadow_message
 from mauve_rt.trace.bag.recorded import SentMessage
 
 _PERIOD_NS = 1_000_000_000
+_PERIOD_AFTER_END_NS = 200_000_000
 
 
 class _Recorded(NamedTuple):
     message: Any
+    data: bytes
     time_ns: int
 
 
 class RecordedShadows:
     """A source of messages for a recorder. All but `finish` for one thread.
 
-    A shadow that runs has a message once a second, and one more after its end. A shadow that ends and is
-    replaced between two calls of take_messages() has no message after its end.
+    A shadow that runs has a message once a second, and one more after its end. While the curves of its
+    outputs go on after that, it has five a second at most. A shadow that ends and is replaced between two
+    calls of take_messages() has no message after its end.
     """
 
     def __init__(self, runtime: Runtime, node_name: str, serialize: Callable[[Any], bytes]) -> None:
@@ -37,7 +40,9 @@ class RecordedShadows:
         """Begin with the shadows that run now: a shadow that has ended is not of this bag."""
         if on:
             ended = {name: one for name, one in self._found().items() if one.verdict != Shadow.RUNNING}
-            self._recorded = {name: _Recorded(message, 0) for name, message in ended.items()}
+            self._recorded = {
+                name: _Recorded(message, self._serialize(message), 0) for name, message in ended.items()
+            }
 
     def finish(self) -> None:
         """Give the present figures with each take_messages() from now on: the recording ends. Any thread."""
@@ -54,11 +59,11 @@ class RecordedShadows:
                 found[name] = ended = copy(message)
                 ended.verdict, ended.end_ns, ended.reason = Shadow.ENDED, now_ns, "the component was removed"
         self._seen = found
-        due = [(name, message) for name, message in found.items() if self._is_due(name, message, now_ns)]
-        self._recorded |= {name: _Recorded(message, now_ns) for name, message in due}
+        all_now = {name: _Recorded(one, self._serialize(one), now_ns) for name, one in found.items()}
+        due = {name: one for name, one in all_now.items() if self._is_due(name, one)}
+        self._recorded |= due
         return [
-            SentMessage(self._topic, "mauve_msgs/msg/Shadow", self._serialize(message), now_ns, None)
-            for _, message in due
+            SentMessage(self._topic, "mauve_msgs/msg/Shadow", one.data, now_ns, None) for one in due.values()
         ]
 
     def dropped_messages(self) -> int:
@@ -67,13 +72,17 @@ class RecordedShadows:
 
     def _found(self) -> dict[str, Any]:
         """By component."""
-        return {record.component: shadow_message(record) for record in self._runtime.shadows()}
+        return {record.component: shadow_message(record, curves=True) for record in self._runtime.shadows()}
 
-    def _is_due(self, component: str, message: Any, now_ns: int) -> bool:
+    def _is_due(self, component: str, one: _Recorded) -> bool:
         before = self._recorded.get(component)
         if before is None:
             return True
-        goes_on = message.verdict == Shadow.RUNNING and message.begin_ns == before.message.begin_ns
-        if goes_on and not self._is_finishing:
-            return now_ns >= before.time_ns + _PERIOD_NS
-        return bool(message != before.message)  # its thread may complete a release after its end
+        now, then = one.message, before.message
+        goes_on = (now.begin_ns, now.verdict) == (then.begin_ns, then.verdict) and not self._is_finishing
+        is_running = now.verdict == Shadow.RUNNING
+        period_ns = _PERIOD_NS if is_running else _PERIOD_AFTER_END_NS
+        if goes_on and (is_running or one.time_ns < before.time_ns + period_ns):
+            return one.time_ns >= before.time_ns + period_ns
+        # After the end its thread may complete a release, and the curves go on. As bytes: NaN equals NaN.
+        return one.data != before.data

@@ -527,7 +527,9 @@ void TransactionCommit::Work::renew_fallback(Change& change) {
 /// A shadow that begins has the properties that the same change sets.
 void TransactionCommit::Work::settle_shadow(const DraftComponent& changed) {
   Component& component = *changed.component;
-  component.settle_shadow();  // the take may have ended it
+  // The take may have ended it. The curves of a candidate that went in go on.
+  if (const auto before = component.last_shadow(); before == nullptr || !before->measures_outputs())
+    component.settle_shadow();
   if (changed.shadow != nullptr) component.keep_shadow(changed.shadow);
   const auto shadow = component.last_shadow();
   if (shadow == nullptr) return;

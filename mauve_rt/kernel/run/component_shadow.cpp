@@ -20,7 +20,7 @@ void Component::conclude_shadow() noexcept {
 
 void Component::settle_shadow() noexcept {
   const auto shadow = last_shadow();
-  if (shadow == nullptr || !shadow->has_ended() || shadow->awaits_outputs()) return;
+  if (shadow == nullptr || !shadow->has_ended()) return;
   task_.forget_shadow(*shadow);
   shadow->detach();
   retire_shadow(shadow);

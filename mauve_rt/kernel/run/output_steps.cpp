@@ -95,6 +95,8 @@ void OutputSteps::note(std::size_t port, const void* live, const void* candidate
 bool OutputSteps::compare(time_ns_t instant_ns) {
   bool are_near = true;
   for (One& each : all_) {
+    each.compared[compared_ % kCurve] = {
+        .instant_ns = instant_ns, .live = each.live, .candidate = each.candidate};
     const double difference =
         std::abs(each.candidate - each.live);  // NaN where one of them is, or is unknown
     are_near &= difference <= each.greatest;
@@ -102,6 +104,7 @@ bool OutputSteps::compare(time_ns_t instant_ns) {
     each.least = difference;
     each.least_instant_ns = instant_ns;
   }
+  ++compared_;
   return are_near;
 }
 
@@ -121,6 +124,27 @@ std::vector<OutputStep> OutputSteps::shown() const {
                      .step = each.step.load(std::memory_order_relaxed)});
   }
   return shown;
+}
+
+std::vector<OutputCurve> OutputSteps::curves() const {
+  std::vector<OutputCurve> curves;
+  for (const One& each : all_) {
+    OutputCurve& curve = curves.emplace_back();
+    curve.output = each.output;
+    curve.instant_ns = instant_ns_.load(std::memory_order_relaxed);
+    for (std::size_t number = compared_ - std::min(compared_, kCurve); number < compared_; ++number) {
+      const Compared& release = each.compared[number % kCurve];
+      curve.instants_ns.push_back(release.instant_ns);
+      curve.live.push_back(release.live);
+      curve.candidate.push_back(release.candidate);
+    }
+    const std::size_t count = each.news_count.load(std::memory_order_acquire);
+    for (std::size_t number = 0; number < count; ++number) {
+      curve.new_instants_ns.push_back(each.news[number].instant_ns);
+      curve.new_core.push_back(each.news[number].number);
+    }
+  }
+  return curves;
 }
 
 }  // namespace mauve

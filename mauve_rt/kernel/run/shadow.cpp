@@ -163,12 +163,12 @@ void Shadow::begin(const State* wait, const CoreBase* live, time_ns_t now_ns) no
 
 void Shadow::start() noexcept {
   capture_.start();
-  awaits_outputs_.store(false, std::memory_order_release);  // what follows is no step of the swap
+  end_measurement();  // what follows is no step of the swap
 }
 
 bool Shadow::end_release(time_ns_t instant_ns, const State* next_wait, const CoreBase* live) noexcept {
-  if (awaits_outputs()) [[unlikely]]
-    return measure_steps();
+  if (measures_outputs()) [[unlikely]]
+    return measure_steps(instant_ns);
   if (phase_.load(std::memory_order_acquire) != kRunning) return false;
   const std::int64_t from =
       next_wait != nullptr ? static_cast<std::int64_t>(next_wait->index) : ShadowCapture::kStart;
@@ -189,16 +189,18 @@ bool Shadow::await_outputs() noexcept {
   steps_->note_last([this](std::size_t port) MAUVE_RT { return capture_.present(port); });
   capture_.forget_release();
   awaits_outputs_.store(true, std::memory_order_release);
+  measures_outputs_.store(true, std::memory_order_release);
   return true;
 }
 
-bool Shadow::measure_steps() noexcept {
-  steps_->note_first([this](std::size_t port)
-                         MAUVE_RT { return capture_.is_noted(port) ? capture_.present(port) : nullptr; });
+bool Shadow::measure_steps(time_ns_t instant_ns) noexcept {
+  steps_->note_new(instant_ns, [this](std::size_t port) MAUVE_RT {
+    return capture_.is_noted(port) ? capture_.present(port) : nullptr;
+  });
   capture_.forget_release();
   if (!steps_->are_known()) return false;
-  awaits_outputs_.store(false, std::memory_order_release);
-  return true;
+  awaits_outputs_.store(false, std::memory_order_release);  // a report waits for the steps alone
+  return steps_->is_complete();
 }
 
 std::unique_ptr<CoreBase> Shadow::hand_over() noexcept {
@@ -219,7 +221,7 @@ void Shadow::conclude_if_hung(time_ns_t longest_ns) noexcept {
 void Shadow::conclude(ShadowCause why, time_ns_t now_ns) noexcept {
   std::uint32_t seen = phase_.load(std::memory_order_acquire);
   do {
-    if (seen >= kEnding) return awaits_outputs_.store(false, std::memory_order_release);
+    if (seen >= kEnding) return end_measurement();
     // acq_rel: one of all that would end it does
   } while (!phase_.compare_exchange_weak(seen, kEnding, std::memory_order_acq_rel));
   MAUVE_EXPECTS(why != ShadowCause::none);
@@ -316,7 +318,9 @@ ShadowRecord Shadow::record() const {
   record.over_budget = figures_.over_budget;
   record.largest_execution_ns = figures_.largest_execution_ns;
   for (const auto& [place, comparison] : comparisons_) record.outputs.push_back(comparison.difference());
-  if (steps_ != nullptr) record.steps = steps_->shown();
+  if (steps_ == nullptr) return record;
+  record.steps = steps_->shown();
+  record.curves = steps_->curves();
   return record;
 }
 

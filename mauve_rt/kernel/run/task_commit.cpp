@@ -271,6 +271,8 @@ void Task::join_newer(time_ns_t epoch_ns) noexcept {
 void Task::note_taken(const Commit& commit) noexcept {
   machine_.change_at(commit.instant_ns());
   taken_ns_.store(commit.instant_ns(), std::memory_order_relaxed);
+  if (shadow_.is_set()) [[unlikely]]
+    note_swap(commit.instant_ns());
 }
 
 /// After its own take: the wake-up of an ordinary thread is no part of a component's blackout.

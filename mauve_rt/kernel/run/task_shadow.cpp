@@ -6,6 +6,7 @@
 namespace mauve {
 
 void Task::set_shadow(Shadow& shadow) noexcept {
+  if (shadow_.is_set()) leave_shadow();  // the curves of a promoted candidate end here
   shadow.begin(machine_.present_wait(), machine_.core(), clock().now_ns());
   shadow_.set(shadow);
 }
@@ -23,6 +24,10 @@ void Task::end_shadow(ShadowCause why) noexcept {
 void Task::leave_shadow() noexcept {
   shadow_.use([](Shadow& shadow) { shadow.detach(); });
   shadow_.revoke(kForever);  // waits for no thread: who runs the machine is the only user
+}
+
+void Task::note_swap(time_ns_t instant_ns) noexcept {
+  shadow_.use([&](Shadow& shadow) { shadow.note_swap(instant_ns); });
 }
 
 void Task::start_shadow() noexcept {

@@ -27,6 +27,7 @@ _FRAMES: dict[str, Callable[[Trace], pd.DataFrame]] = {
     "marks": frames.marks,
     "decisions": frames.decisions,
     "shadows": frames.shadows,
+    "output_curves": frames.output_curves,
     "records": frames.records,
 }
 _ROWS_AT_ONCE = 100_000

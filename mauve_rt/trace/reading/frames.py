@@ -23,6 +23,7 @@ from mauve_rt.trace.reading.trace import Trace
 
 _Int64s = npt.NDArray[np.int64]
 _Known = npt.NDArray[np.bool_]
+_PARTS_OF_SHADOWS = ("outputs", "steps", "curves")
 
 
 def releases(trace: Trace) -> pd.DataFrame:
@@ -111,13 +112,30 @@ def shadows(trace: Trace) -> pd.DataFrame:
     """
     found = [(one, output) for one in trace.shadow_reports for output in one.outputs]
     of_output = [field.name for field in fields(ShadowOutput)]
-    of_shadow = [field.name for field in fields(Shadow) if field.name not in (*of_output, "outputs", "steps")]
+    of_shadow = [field.name for field in fields(Shadow) if field.name not in {*of_output, *_PARTS_OF_SHADOWS}]
     columns = {name: [getattr(one, name) for one, _ in found] for name in of_shadow}
     columns |= {name: [getattr(output, name) for _, output in found] for name in of_output}
     words = ("component", "core", "live_core", "verdict", "reason", "port", "field")
     kinds = dict.fromkeys(words, "category") | dict.fromkeys(("maximum", "rms"), "float64")
     kinds |= dict.fromkeys(("end_ns", "lag"), "Int64")
     return pd.DataFrame(columns).astype({name: kinds.get(name, "int64") for name in columns})
+
+
+def output_curves(trace: Trace) -> pd.DataFrame:
+    """Outputs of bumpless changes around the swap, a row per number: the series live, candidate, new_core.
+
+    swap_ns: T; missing where the candidate did not go in.
+    """
+    rows = [
+        (one.component, one.core, curve.output, series, time_ns, number, curve.instant_ns)
+        for one in trace.shadows
+        for curve in one.curves
+        for series in ("live", "candidate", "new_core")
+        for time_ns, number in curve.points(series)
+    ]
+    words = ("component", "core", "output", "series")
+    kinds = dict.fromkeys(words, "category") | {"time_ns": "int64", "number": "float64", "swap_ns": "Int64"}
+    return pd.DataFrame(rows, columns=list(kinds)).astype(kinds)
 
 
 def deployments(trace: Trace) -> pd.DataFrame:
@@ -290,6 +308,11 @@ class Frames:
     def shadows(self) -> pd.DataFrame:
         """As frames.shadows."""
         return shadows(self._trace)
+
+    @cached_property
+    def output_curves(self) -> pd.DataFrame:
+        """As frames.output_curves."""
+        return output_curves(self._trace)
 
     @cached_property
     def deployments(self) -> pd.DataFrame:

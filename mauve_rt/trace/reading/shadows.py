@@ -84,6 +84,43 @@ class OutputStep:
 
 
 @dataclass(frozen=True)
+class OutputCurve:
+    """One output of a bumpless change around the swap, by release, oldest first."""
+
+    output: str
+    """Port and number, e.g. `command.torque`."""
+    instant_ns: int | None
+    """T: the component runs with the candidate from then on; None: the candidate did not go in."""
+    instants_ns: tuple[int, ...]
+    """Of the last releases in which both cores were compared."""
+    live: tuple[float, ...]
+    """Written by the core before in these releases; NaN where it had not written yet."""
+    candidate: tuple[float, ...]
+    new_instants_ns: tuple[int, ...]
+    """Of the first releases after T that wrote the output."""
+    new_core: tuple[float, ...]
+    """Written by the new core in these releases."""
+
+    def points(self, series: str) -> list[tuple[int, float]]:
+        """Return the instants and numbers of live, candidate or new_core."""
+        instants_ns = self.new_instants_ns if series == "new_core" else self.instants_ns
+        return list(zip(instants_ns, getattr(self, series), strict=True))
+
+    @classmethod
+    def of_message(cls, message: Any) -> Self:
+        """Take it from a mauve_msgs/msg/OutputCurve, of whichever library."""
+        return cls(
+            output=message.output,
+            instant_ns=int(message.instant_ns) or None,
+            instants_ns=tuple(map(int, message.instants_ns)),
+            live=tuple(map(float, message.live)),
+            candidate=tuple(map(float, message.candidate)),
+            new_instants_ns=tuple(map(int, message.new_instants_ns)),
+            new_core=tuple(map(float, message.new_core)),
+        )
+
+
+@dataclass(frozen=True)
 class Shadow:
     """A shadow as one message of the bag reports it. Times in ns of CLOCK_MONOTONIC, or of virtual time."""
 
@@ -120,6 +157,8 @@ class Shadow:
     outputs: tuple[ShadowOutput, ...]
     steps: tuple[OutputStep, ...] = ()
     """Of a bumpless change: the outputs that it bounds."""
+    curves: tuple[OutputCurve, ...] = ()
+    """The same outputs around the swap."""
 
     @classmethod
     def of_message(cls, message: Any, time_ns: int) -> Self:
@@ -139,6 +178,7 @@ class Shadow:
             outputs=tuple(ShadowOutput.of_message(output) for output in message.outputs),
             # bags of earlier versions have none
             steps=tuple(OutputStep.of_message(step) for step in getattr(message, "steps", ())),
+            curves=tuple(OutputCurve.of_message(curve) for curve in getattr(message, "curves", ())),
             **{name: int(getattr(message, name)) for name in counts},
         )
 

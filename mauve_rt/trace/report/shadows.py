@@ -5,6 +5,7 @@ import math
 from mauve_rt.trace.reading.shadows import OutputStep, Shadow, ShadowOutput
 from mauve_rt.trace.report.analysis import Analysis
 from mauve_rt.trace.report.blocks import Cell, Section, table
+from mauve_rt.trace.report.output_curves import output_curves
 from mauve_rt.trace.report.units import number_text, time_text
 
 _MANY_ROWS = 400
@@ -25,7 +26,7 @@ def shadows_section(analysis: Analysis) -> Section | None:
     html += table(_OUTPUTS, [_output_row(one, output) for one in found for output in one.outputs])
     steps = [_step_row(one, step) for one in found for step in one.steps]
     if steps:
-        html += f"<h3>Outputs of bumpless changes</h3>{table(_STEPS, steps)}"
+        html += f"<h3>Outputs of bumpless changes</h3>{table(_STEPS, steps)}{output_curves(found)}"
     more = len(analysis.trace.shadows) - len(found)
     return Section(
         "Shadows",
@@ -34,6 +35,8 @@ def shadows_section(analysis: Analysis) -> Section | None:
         "Skipped: late, as the shadow's thread was late; budget, to stay within the budget. "
         "Lag: releases by which the candidate's first number of the port is later. "
         "Step: the new core's first output minus the old core's last one. "
+        "T: the component runs with the new core from then on; without a swap, 0 ms is the last release "
+        "that was compared. "
         "Verdict running: the shadow ran when the recording ended.",
         anchor="shadows",
     )

@@ -196,6 +196,64 @@ TYPED_TEST(Bumpless, ACandidateThatMissesReleasesHasTheStateAllTheSame) {
   }
 }
 
+TYPED_TEST(Bumpless, TheCurvesHaveTheReleasesAroundTheSwap) {
+  this->deploy_live([](const CountingCore& core) { return 1.0 + 1e-3 * core.count(); });
+  const auto report = this->host.commit(this->replacement(
+      [](const CountingCore& core) {
+        return 1.0 + 1e-3 * core.count() + (core.runs.load() < 100 ? 3.0 : 0.1);
+      },
+      this->within(0.25)));
+  this->host.until([&] { return this->record().curves.front().new_core.size() == OutputSteps::kCurve; },
+                   "the curve");
+  this->host.until([&] { return this->next->count >= 250; }, "more releases");
+  this->host.stop("c");
+  ASSERT_EQ(1U, this->record().curves.size());
+  const OutputCurve curve = this->record().curves.front();
+  EXPECT_EQ("output.value", curve.output);
+  EXPECT_EQ(report.instant_ns, curve.instant_ns);
+  const auto written = [](const Log& log) {
+    return std::map<time_ns_t, double>(log.written.begin(), log.written.end());
+  };
+  const auto live = written(*this->live);
+  const auto next = written(*this->next);
+  ASSERT_EQ(OutputSteps::kCurve, curve.instants_ns.size()) << "the last ones of at least a hundred";
+  for (std::size_t place = 0; place < curve.instants_ns.size(); ++place) {
+    EXPECT_EQ(live.at(curve.instants_ns[place]), curve.live[place]);
+    EXPECT_EQ(next.at(curve.instants_ns[place]), curve.candidate[place]);
+  }
+  EXPECT_EQ(live.rbegin()->first, curve.instants_ns.back()) << "up to the last release of the old core";
+  ASSERT_EQ(OutputSteps::kCurve, curve.new_instants_ns.size());
+  auto expected = next.lower_bound(report.instant_ns);
+  for (std::size_t place = 0; place < curve.new_instants_ns.size(); ++place, ++expected) {
+    EXPECT_EQ(expected->first, curve.new_instants_ns[place]);
+    EXPECT_EQ(expected->second, curve.new_core[place]);
+  }
+}
+
+TYPED_TEST(Bumpless, ACurveEndsWithTheNextChange) {
+  this->deploy_live([](const CountingCore&) { return 1.0; });
+  const auto swap = [&](const Law& law) { this->host.commit(this->replacement(law, this->within(1e9))); };
+  swap([](const CountingCore&) { return 2.0; });
+  this->host.until([&] { return !this->record().curves.front().new_core.empty(); }, "the first new core");
+  const auto numbers_of = [&] { return this->record().curves.front().new_core; };
+  Transaction plain;
+  plain.replace_core("c", this->make_core("t/Plain", [](const CountingCore&) { return 3.0; }, &this->next));
+  this->host.commit(std::move(plain));
+  this->host.until([&] { return this->next->count >= 100; }, "the plain core");
+  EXPECT_THAT(numbers_of(), ::testing::Each(2.0));
+  swap([](const CountingCore&) { return 4.0; });
+  this->host.until([&] { return !numbers_of().empty(); }, "the second new core");
+  swap([](const CountingCore&) { return 5.0; });
+  this->host.until([&] { return !numbers_of().empty(); }, "the third new core");
+  this->host.stop("c");
+  const std::size_t seen = numbers_of().size();
+  this->host.start("c");
+  const int before = this->next->count;
+  this->host.until([&] { return this->next->count >= before + 100; }, "the core that was started again");
+  EXPECT_THAT(numbers_of(), ::testing::Each(5.0));
+  EXPECT_EQ(seen, numbers_of().size()) << "a stop ends the curve";
+}
+
 TYPED_TEST(Bumpless, ACoreThatDoesNotComeNearIsRefusedWithItsLeastDifference) {
   Component& component = this->deploy_live([](const CountingCore&) { return 1.0; });
   std::string text;
@@ -215,6 +273,11 @@ TYPED_TEST(Bumpless, ACoreThatDoesNotComeNearIsRefusedWithItsLeastDifference) {
   this->host.until([&] { return this->live->count >= before + 5; }, "the live core");
   EXPECT_EQ(Verdict::ended, this->record().verdict);
   EXPECT_THAT(this->record().reason, HasSubstr("the change was refused"));
+  const OutputCurve curve = this->record().curves.front();
+  EXPECT_EQ(0, curve.instant_ns);
+  EXPECT_THAT(curve.live, ::testing::Each(1.0));
+  EXPECT_THAT(curve.candidate, ::testing::Contains(9.0));
+  EXPECT_THAT(curve.new_core, ::testing::IsEmpty());
   // Nothing is left of it: the next change is made.
   this->host.commit(this->replacement([](const CountingCore&) { return 1.0; }, this->within(0.25)));
   EXPECT_EQ("t/Next", component.core_implementation());

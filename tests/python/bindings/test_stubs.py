@@ -66,5 +66,5 @@ def test_a_stub_has_the_docstrings_of_its_module():
 
 def test_the_keywords_of_a_component_are_the_settings_of_the_kernel():
     classes = {node.name: node for node in stub_of(KERNEL).body if isinstance(node, ast.ClassDef)}
-    assert names(classes["TaskSettings"].body) == {*KERNEL.TASK_SETTINGS, "states"}
+    assert names(classes["TaskSettings"].body) == {*KERNEL.TASK_SETTINGS, "states", "max_slew"}
     assert names(classes["StateTimes"].body) == {*KERNEL.STATE_TIMES}

@@ -168,6 +168,39 @@ def test_a_bag_has_the_shadows_of_its_own_time(world: World) -> None:
     assert message.begin_ns > before.end_ns
 
 
+def _replace(world: World, core: str, greatest: float, within_s: float) -> bool:
+    value = f"{{bumpless: {{outputs: {{sum.data: {greatest}}}, within_s: {within_s}}}}}"
+    return world.ask(Step("replace_core", "loop", f"reload_tests/{core}", value)).success
+
+
+def test_a_bag_has_the_curves_of_a_bumpless_change(world: World) -> None:
+    bag = Bag(world)
+    assert _replace(world, "Other", 1e9, 60)
+    while not bag.found or len(bag.found[-1][1].curves[0].new_core) < 64:
+        bag.take(50)
+    assert bag.take(1100) == 0, "the curves are complete"
+    (curve,) = bag.found[-1][1].curves
+    assert curve.output == "sum.data"
+    assert curve.instants_ns[-1] < curve.instant_ns <= curve.new_instants_ns[0]
+    assert len(curve.instants_ns) == len(curve.live) == len(curve.candidate)
+    assert list(curve.new_core) == [curve.new_core[0] + number for number in range(64)]
+    (info,) = (info for info in component_infos(world.runtime) if info.name == "loop")
+    assert info.shadows[0].steps
+    assert not info.shadows[0].curves, "they are large, and the list is asked for often"
+
+
+def test_a_refused_bumpless_change_is_in_the_bag_once(world: World) -> None:
+    bag = Bag(world)
+    assert not _replace(world, "Louder", 0.001, 0.1)
+    while Shadow.ENDED not in bag.verdicts():
+        bag.take(50)
+    bag.take(1100)
+    assert bag.take(1100) == 0, "a step that is not known is no news"
+    (curve,) = bag.found[-1][1].curves
+    assert (curve.instant_ns, list(curve.new_core)) == (0, [])
+    assert len(curve.live) > 0
+
+
 def test_the_shadow_of_a_removed_component_has_ended(world: World) -> None:
     bag = Bag(world)
     _shadow(world, "Louder")

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <limits>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mauve_rt/base/rt.hpp"
@@ -43,13 +44,30 @@ struct OutputStep {
   double step{kUnknown};          // the new core's first output minus the old core's last one
 };
 
+/// The numbers of one listed output around the swap, by release at its nominal instant, oldest first. NaN: not yet written.
+struct OutputCurve {
+  std::string output{};                      // as OutputStep::output
+  time_ns_t instant_ns{0};                   // T; 0: the candidate did not go into a component that runs
+  std::vector<time_ns_t> instants_ns{};      // of the last releases that were compared
+  std::vector<double> live{};                // written by the live core in them
+  std::vector<double> candidate{};           // written by the candidate in them
+  std::vector<time_ns_t> new_instants_ns{};  // of the first releases of the new core that wrote the output
+  std::vector<double> new_core{};            // written by the new core in them
+};
+
 /// | member         | written by                         | read by                   | order                               |
 /// | -------------- | ---------------------------------- | ------------------------- | ----------------------------------- |
-/// | numbers ... least_instant_ns | who executes the candidate | the same; who tells of it | Shadow::figures_mutex_         |
-/// | before         | the component's thread             | the same                  | -                                   |
+/// | numbers ... compared, compared_ | who executes the candidate   | the same; who tells of it | Shadow::figures_mutex_              |
+/// | before, is_awaited, new_releases_ | the component's thread | the same           | -                                   |
+/// | news           | the component's thread             | who tells of it           | news_count: those before it are complete |
+/// | news_count     | the component's thread             | anyone                    | release/acquire: news               |
+/// | instant_ns_    | the component's thread             | anyone                    | relaxed: a lone number; 0 until then |
 /// | step           | the component's thread             | anyone                    | relaxed: a lone number; NaN until then |
 class OutputSteps {
  public:
+  /// So many releases of both cores before the swap are kept, and of the new core after it: 2.5 kB for each output.
+  static constexpr std::size_t kCurve = 64;
+
   /// Throws Error: unknown_port, invalid_argument (no write port, no number there, a port that writes zero at each change). [non-rt]
   OutputSteps(const Shell& shell, const std::string& component, const std::vector<GreatestStep>& outputs);
 
@@ -66,23 +84,48 @@ class OutputSteps {
       each.is_awaited = true;
     }
   }
+  /// The first instant at which the component runs with the new core; does nothing when called again. [rt], the component's thread
+  void note_swap(time_ns_t instant_ns) MAUVE_RT {
+    if (instant_ns_.load(std::memory_order_relaxed) == 0)
+      instant_ns_.store(instant_ns, std::memory_order_relaxed);
+  }
   /// After a release of the new core: `written(port)` gives what it has written to it, or nullptr. [rt], the component's thread
   template <typename Written>
-  void note_first(const Written& written) MAUVE_RT {
+  void note_new(time_ns_t instant_ns, const Written& written) MAUVE_RT {
     for (One& each : all_) {
       const void* const value = written(each.port);
-      if (value == nullptr || !each.is_awaited) continue;
-      each.is_awaited = false;
-      each.step.store(each.place.of(value) - each.before, std::memory_order_relaxed);
+      if (value == nullptr) continue;
+      const double number = each.place.of(value);
+      if (std::exchange(each.is_awaited, false))
+        each.step.store(number - each.before, std::memory_order_relaxed);
+      // relaxed: this thread writes it
+      const std::size_t count = each.news_count.load(std::memory_order_relaxed);
+      if (count == kCurve) continue;
+      each.news[count] = {.instant_ns = instant_ns, .number = number};
+      each.news_count.store(count + 1, std::memory_order_release);
     }
+    ++new_releases_;
   }
   /// Whether all steps are known. [rt], the component's thread
   bool are_known() const MAUVE_RT;
+  /// Whether they are, and the curves have all releases that they keep. [rt], the component's thread
+  bool is_complete() const MAUVE_RT { return new_releases_ >= kCurve && are_known(); }
 
   /// [non-rt]
   std::vector<OutputStep> shown() const;
+  /// [non-rt]
+  std::vector<OutputCurve> curves() const;
 
  private:
+  struct Compared {
+    time_ns_t instant_ns{0};
+    double live{OutputStep::kUnknown};
+    double candidate{OutputStep::kUnknown};
+  };
+  struct New {
+    time_ns_t instant_ns{0};
+    double number{OutputStep::kUnknown};
+  };
   struct One {
     std::string output{};
     std::size_t port{0};
@@ -92,12 +135,18 @@ class OutputSteps {
     double candidate{OutputStep::kUnknown};
     double least{OutputStep::kUnknown};
     time_ns_t least_instant_ns{0};
+    std::vector<Compared> compared = std::vector<Compared>(kCurve);  // a ring
     double before{OutputStep::kUnknown};
     bool is_awaited{false};
+    std::vector<New> news = std::vector<New>(kCurve);
+    Atomic<std::size_t> news_count{0};
     Atomic<double> step{OutputStep::kUnknown};
   };
 
   std::vector<One> all_;
+  std::size_t compared_{0};  // releases
+  std::size_t new_releases_{0};
+  Atomic<time_ns_t> instant_ns_{0};
 };
 
 }  // namespace mauve

@@ -79,6 +79,7 @@ struct ShadowRecord {
   time_ns_t largest_execution_ns{0};        // of one release
   std::vector<OutputDifference> outputs{};  // by write port
   std::vector<OutputStep> steps{};          // of a bumpless change, as it listed them
+  std::vector<OutputCurve> curves{};        // the same outputs
 };
 
 /// The parts of a candidate: a shell of the component's own class, the core, another instance of the component's fsm.
@@ -117,6 +118,7 @@ struct ShadowParts {
 /// | skipped_budget_   | who executes                                | anyone                 | relaxed: a lone number               |
 /// | follows_          | who makes it wait for near outputs          | the component's thread | relaxed: a lone flag                 |
 /// | awaits_outputs_   | the component's thread, who closes it       | anyone                 | release/acquire: the steps           |
+/// | measures_outputs_ | the component's thread, who closes or detaches it | anyone           | release/acquire: the curves          |
 /// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
@@ -150,7 +152,10 @@ class Shadow {
   /// Ends it; does nothing when it has ended before. [rt], any thread
   void conclude(ShadowCause why, time_ns_t now_ns) MAUVE_RT;
   /// Captures no more: the component's ports refer to it no longer. [rt], or an ordinary thread that has claimed the component
-  void detach() MAUVE_RT { capture_.detach(); }
+  void detach() MAUVE_RT {
+    end_measurement();
+    capture_.detach();
+  }
   bool has_ended() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kEnded; }
 
   // ---- a bumpless change: the candidate goes in where its outputs are near
@@ -159,15 +164,21 @@ class Shadow {
   bool is_near() const MAUVE_RT { return near_.load(std::memory_order_acquire) == capture_.captured(); }
   /// The candidate's core, which executes no more here; nullptr: the shadow's thread looks at it this moment, or it has ended. [rt]
   std::unique_ptr<CoreBase> hand_over() MAUVE_RT;
-  /// It was promoted: measures the first value of each listed output. Whether there is one to measure. [rt], the component's thread
+  /// It was promoted: measures the first values of each listed output. Whether there is one to measure. [rt], the component's thread
   bool await_outputs() MAUVE_RT;
+  /// The component runs with the promoted core from this instant on. [rt], the component's thread
+  void note_swap(time_ns_t instant_ns) MAUVE_RT {
+    if (measures_outputs()) steps_->note_swap(instant_ns);
+  }
 
   /// Ends it when a release of the candidate executes for longer than this. [non-rt]
   void conclude_if_hung(time_ns_t longest_ns) noexcept;
   /// It was promoted, and a listed output of the new core is yet to be measured. [rt], any thread
   bool awaits_outputs() const MAUVE_RT { return awaits_outputs_.load(std::memory_order_acquire); }
+  /// It was promoted, and the curves of the listed outputs go on: OutputSteps::kCurve releases. [rt], any thread
+  bool measures_outputs() const MAUVE_RT { return measures_outputs_.load(std::memory_order_acquire); }
   /// It has ended, and the component's ports still refer to it. [rt], any thread
-  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached() && !awaits_outputs(); }
+  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached() && !measures_outputs(); }
 
   // ---- who executes: the shadow's thread, or a simulation
 
@@ -217,7 +228,11 @@ class Shadow {
   void connect_cells();
   void bind();
   std::unique_lock<Mutex> lock_core(time_ns_t timeout_ns);
-  bool measure_steps() MAUVE_RT;
+  bool measure_steps(time_ns_t instant_ns) MAUVE_RT;
+  void end_measurement() MAUVE_RT {
+    awaits_outputs_.store(false, std::memory_order_release);
+    measures_outputs_.store(false, std::memory_order_release);
+  }
   bool run_oldest() noexcept MAUVE_REQUIRES(run_mutex_);
   void execute(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
   void take_properties();
@@ -242,6 +257,7 @@ class Shadow {
   Atomic<std::uint64_t> near_{kNeverNear};  // the last release, counted as ShadowCapture::captured()
   RevocableReference<Task> awaiting_;
   Atomic<bool> awaits_outputs_{false};
+  Atomic<bool> measures_outputs_{false};
   Atomic<std::uint64_t> skipped_budget_{0};
   Atomic<bool> follows_{false};
 

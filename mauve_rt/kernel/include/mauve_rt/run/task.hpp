@@ -459,6 +459,7 @@ class Task final : public Waiter {
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void watch_probation() noexcept;
+  void note_swap(time_ns_t instant_ns) MAUVE_RT;
   void start_shadow() noexcept;
   void leave_shadow() noexcept;
   void capture_release() noexcept;
