@@ -34,8 +34,9 @@ class Handover {
   /// Copies the matching fields, and leaves the old core as it is. [rt] as far as the cores are.
   void copy() noexcept;
 
-  /// The matching fields as bytes, of which there are so many: of the old core, for the new one. [rt] as far as the cores are.
+  /// How many bytes the matching fields have. [rt]
   std::size_t bytes() const MAUVE_RT { return bytes_; }
+  /// These bytes: of the old core, and for the new one. [rt] as far as the cores are.
   void save(std::byte* fields) noexcept;
   void load(const std::byte* fields) noexcept;
 

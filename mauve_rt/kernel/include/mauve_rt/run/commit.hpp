@@ -36,7 +36,7 @@ class CommitAction {
   /// The time that adopt and take declare to need together; 0: none declared. [rt]
   virtual time_ns_t declared_ns() const MAUVE_RT { return 0; }
   /// Whether the component may vote in this wait; `is_last`: all others have voted. Asked of the last voter (Commit::set_last()) in each
-  /// wait until it says so; what it says then holds until the vote. [rt], the component's thread
+  /// wait until it says so; what it says then holds until the vote. [rt] as far as the part is, the component's thread
   virtual bool is_ready(bool /*is_last*/) noexcept { return true; }
   /// The action's name in the trace. [rt]
   virtual std::uint32_t trace_id() const MAUVE_RT { return 0; }
@@ -222,8 +222,8 @@ class Commit {
     ready_within_ns_ = within_ns;
     pass_time_ = std::move(pass_time);
   }
-  /// Whether the participant may vote in this wait. [rt], the participant's thread
-  bool is_ready(Participant& participant) MAUVE_RT;
+  /// Whether the participant may vote in this wait. [rt] as far as the actions are, the participant's thread
+  bool is_ready(Participant& participant) noexcept;
   /// It is for threads that run: it ends when they are shut down. [setup]
   void set_hosted() noexcept { is_hosted_ = true; }
   /// What it makes of the table. [setup]

@@ -143,7 +143,8 @@ class Shadow {
   // ---- the component's thread, or who acts for a parked component
 
   /// Captures from now on; the component is in this wait, or in none, with this core. [rt] as far as the cores' state fields are.
-  void begin(const State* wait, const CoreBase* live, time_ns_t now_ns) MAUVE_RT;
+  void begin(const State* wait, const CoreBase* live, time_ns_t now_ns) noexcept;
+  /// [rt]
   bool has_begun() const MAUVE_RT { return phase_.load(std::memory_order_acquire) != kPrepared; }
   /// The component starts in its initial state. [rt]
   void start() MAUVE_RT;
