@@ -11,15 +11,16 @@
 
 namespace mauve {
 
-namespace {
-
-using Turn = std::array<NumberPlace, 4>;  // x, y, z, w
-
 /// What can be between two values.
 struct BlendedPlaces {
+  using Turn = std::array<NumberPlace, 4>;  // x, y, z, w
   std::vector<NumberPlace> numbers{};
   std::vector<Turn> turns{};
 };
+
+namespace {
+
+using Turn = BlendedPlaces::Turn;
 
 /// Along with those of its fields; `before`: its path, and a dot.
 void add_places(const PortBase& port, const std::vector<FieldShape>& fields, const std::string& before,

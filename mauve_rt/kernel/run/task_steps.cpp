@@ -7,6 +7,7 @@
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/run/shadow.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
