@@ -4,9 +4,9 @@
 //   bench_shadow [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0] [--turns 10] [--releases 50]
 // Prints {"read_ps": [...], "tapped_read_ps": [...], "write_ps": [...], "tapped_write_ps": [...], "watched_write_ps": [...],
 // "limited_write_ps": [...], "capture_ps": [...]} in picoseconds a call, of values of 16 bytes. A deployed 1 kHz component that reads and writes once a
-// release follows, with {"plain_ns": [...], "shadowed_ns": [...], "waking_ns": [...], "probation_ns": [...]}: CPU time of the
+// release follows, with {"plain_ns": [...], "shadowed_ns": [...], "waking_ns": [...], "probation_ns": [...], "blended_ns": [...]}: CPU time of the
 // component's thread from one release to the next. "waking" has no shadow, and wakes a sleeping ordinary thread in each release.
-// "releases" and "compared": of the releases with a shadow, those that the candidate executed.
+// "blended" is a blend of two equal cores, "early" the blends that an overrun ended. "releases" and "compared": of the releases with a shadow, those that the candidate executed.
 #include <sys/resource.h>
 #include <unistd.h>
 
@@ -20,6 +20,14 @@
 #include "support/micro.hpp"
 #include "support/values.hpp"
 
+namespace bench {
+struct Torque {
+  double first{};
+  double second{};
+};
+}  // namespace bench
+MAUVE_TYPE(bench::Torque, "bench_msgs/msg/Torque", first, second)
+
 namespace {
 
 using bench::Small;
@@ -31,6 +39,11 @@ constexpr double kLeast = -1e12, kMost = 1e12;  // of the output; no value is be
 struct PipeShell : bench::WorkerShell {
   mauve::ReadPort<Small>& input = read_port<Small>("input");
   mauve::WritePort<Small>& output = write_port<Small>("output");
+};
+
+/// With numbers that go over in a blend.
+struct RobotShell : PipeShell {
+  mauve::WritePort<bench::Torque>& torque = write_port<bench::Torque>("torque");
 };
 
 // ---- ports alone
@@ -156,20 +169,21 @@ class CpuTimes {
 /// Reads what it has written in the release before.
 struct Passing : bench::Worker {
   void work() override {
-    auto& pipe = static_cast<PipeShell&>(shell());
-    const Small value = pipe.input.read().value;
-    pipe.output.write({value.first + 1, value.second + 1});
+    auto& robot = static_cast<RobotShell&>(shell());
+    const Small value = robot.input.read().value;
+    robot.output.write({value.first + 1, value.second + 1});
+    robot.torque.write({static_cast<double>(value.first), 1.0});
   }
 };
 
 struct Timed : Passing {
   void work() override {
-    if (times != nullptr) times->note();
+    if (CpuTimes* const noted = times.load(std::memory_order_relaxed)) noted->note();
     Passing::work();
   }
-  void take(mauve::CoreBase& old) noexcept override { times = static_cast<Timed&>(old).times; }
+  void take(mauve::CoreBase& old) noexcept override { times = static_cast<Timed&>(old).times.load(); }
 
-  CpuTimes* times{nullptr};
+  std::atomic<CpuTimes*> times{nullptr};  // of one of both cores in a blend
 };
 
 /// An ordinary thread of the lowest priority that sleeps, as the shadow's.
@@ -225,7 +239,7 @@ struct Waking : Timed {
 mauve::Transaction begin_shadow() {
   mauve::Transaction transaction;
   transaction.shadow("pipe", std::make_unique<Passing>(), {.budget_ns = mauve::ms_to_ns(1)},
-                     std::make_unique<PipeShell>());
+                     std::make_unique<RobotShell>());
   return transaction;
 }
 mauve::Transaction end_shadow() {
@@ -246,6 +260,22 @@ mauve::Transaction put_on_probation() {
   return transaction;
 }
 
+/// Both cores execute until the shadow is ended.
+void blend(mauve::Deployer& deployer, mauve::Component& component, CpuTimes& times) {
+  auto core = std::make_unique<Timed>();
+  Timed& fresh = *core;
+  auto& old = component.core_as<Timed>();
+  mauve::Transaction transaction;
+  transaction.replace_core("pipe", std::move(core),
+                           mauve::ReplaceOptions{.bumpless = mauve::BumplessOptions{
+                                                     .outputs = {{"torque", "first", 1e300}},
+                                                     .within_ns = mauve::s_to_ns(30),
+                                                     .blend_ns = mauve::s_to_ns(60)}});
+  deployer.commit(std::move(transaction), {});
+  old.times = nullptr;
+  fresh.times = &times;
+}
+
 void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   const std::int64_t turns = options.number("turns", 10);
   const std::int64_t count = options.number("releases", 50);
@@ -253,7 +283,8 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   CpuTimes times(static_cast<std::size_t>(20 * turns * (count + 100)));
   mauve::Architecture architecture;
   architecture.add_resource<mauve::SharedData<Small>>("data");
-  mauve::Component& component = architecture.add_component<PipeShell, Timed, bench::WorkerFsm>(
+  architecture.add_resource<mauve::SharedData<bench::Torque>>("torque");
+  mauve::Component& component = architecture.add_component<RobotShell, Timed, bench::WorkerFsm>(
       "pipe", mauve::TaskSettings{.priority = options.priority(), .cpus = {options.cpu()}});
   component.set_property("period_us", kPeriodUs);
   auto first = std::make_unique<Timed>();
@@ -261,6 +292,7 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   component.replace_core(std::move(first));
   architecture.connect("pipe", "input", "data", "read");
   architecture.connect("pipe", "output", "data", "write");
+  architecture.connect("pipe", "torque", "torque", "write");
   architecture.configure();
   mauve::Deployer deployer(architecture);
   deployer.deploy();
@@ -269,6 +301,8 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   std::vector<std::int64_t> shadowed;
   std::vector<std::int64_t> waking;
   std::vector<std::int64_t> probation;
+  std::vector<std::int64_t> blended;
+  std::int64_t early = 0;
   std::int64_t releases = 0;
   std::int64_t compared = 0;
   for (std::int64_t turn = 0; turn < turns; ++turn) {
@@ -284,12 +318,21 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
     deployer.commit(put_on_probation(), {});
     times.collect(probation, count);
     deployer.commit(put_in(std::make_unique<Timed>()), {});
+    blend(deployer, component, times);
+    times.collect(blended, count);
+    if (deployer.shadows().back().verdict == mauve::ShadowVerdict::running) {
+      deployer.commit(end_shadow(), {});
+    } else {
+      ++early;
+    }
   }
   deployer.shutdown();
   line.add("plain_ns", plain)
       .add("shadowed_ns", shadowed)
       .add("waking_ns", waking)
       .add("probation_ns", probation)
+      .add("blended_ns", blended)
+      .add("early", early)
       .add("releases", releases)
       .add("compared", compared);
 }

@@ -292,6 +292,14 @@ std::unique_ptr<Blend> Shadow::make_blend(time_ns_t duration_ns, Component& comp
                  .found = found + " in Python",
                  .remedy = "leave out blend_s"});
   }
+  if (component.task().has_fallen_back()) {  // it is made ready anew for the next fault
+    throw Error(ErrorCode::invalid_argument, "the outputs of a fallback core do not go over",
+                {.component = component_,
+                 .element = "blend_s",
+                 .expected = "a component that does not run its fallback core",
+                 .found = "fallback " + component.core_implementation(),
+                 .remedy = "leave out blend_s"});
+  }
   auto blend = std::make_unique<Blend>(component.shell(), duration_ns);
   blend->binding = parts_.fsm->bind_core(old);
   blend->binding.core = &old;

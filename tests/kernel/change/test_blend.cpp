@@ -81,6 +81,9 @@ Law constant(double value) {
   return [value](FreeCore& core) { core.exposed_shell().output.write({value}); };
 }
 
+/// A computer that stalls for longer than a period ends a blend on threads.
+template <typename Way>
+constexpr std::int64_t kPeriodMs = std::is_same_v<Way, InVirtualTime> ? 1 : 5;
 constexpr time_ns_t kBlend = ms_to_ns(60);
 
 template <typename Way>
@@ -89,7 +92,7 @@ class Blending : public OnBothHosts<Way> {
   Component& deploy_old(const Law& law, const TaskSettings& settings = {}) {
     out = &this->architecture.template add_resource<Recorder<Number>>("out");
     held = &this->architecture.template add_resource<Recorder<Number>>("held");
-    Component& component = this->add("c", 1, settings);
+    Component& component = this->add("c", kPeriodMs<Way>, settings);
     auto core = std::make_unique<FreeCore>(law);
     is_old_cleaned = core->is_cleaned;
     component.replace_core(std::move(core));
@@ -112,6 +115,8 @@ class Blending : public OnBothHosts<Way> {
     const auto all = (*this->host).shadows();
     return all.empty() ? ShadowRecord{} : all.back();
   }
+  /// Whether the component was late by itself.
+  bool is_late() { return !this->is_virtual && record().reason.ends_with("an overrun of the component"); }
   void wait_end() {
     this->host.until([&] { return record().verdict != Verdict::running; }, "the end of the blend");
   }
@@ -135,10 +140,14 @@ class Blending : public OnBothHosts<Way> {
 };
 TYPED_TEST_SUITE(Blending, EveryHost, HostNames);
 
+#define SKIP_IF_LATE() \
+  if (this->is_late()) GTEST_SKIP() << "a busy computer has ended the blend"
+
 TYPED_TEST(Blending, OutputsGoOverLinearly) {
   Component& component = this->deploy_old(constant(0.0));
   const time_ns_t instant_ns = this->replace(constant(10.0));
-  this->wait_written(instant_ns + kBlend + ms_to_ns(5));
+  this->wait_written(instant_ns + kBlend + ms_to_ns(20));
+  SKIP_IF_LATE();
   this->wait_old_cleaned();
   this->host.stop("c");
   auto all = this->out->all();
@@ -155,7 +164,7 @@ TYPED_TEST(Blending, OutputsGoOverLinearly) {
   EXPECT_GT(between, this->is_virtual ? 50U : 0U);
   std::vector<time_ns_t> instants;
   for (const auto& [at_ns, value] : all) instants.push_back(at_ns);
-  expect_released_at_each_instant(instants, component, ms_to_ns(1));
+  expect_released_at_each_instant(instants, component, ms_to_ns(kPeriodMs<TypeParam>));
   EXPECT_EQ(Verdict::promoted, this->record().verdict);
   EXPECT_EQ("the candidate is the component's core now", this->record().reason);
   const auto first = this->out->from(instant_ns).front();
@@ -173,7 +182,7 @@ struct MixedCore : Core<MixedShell> {
 struct MixedFsm : Fsm<MixedShell, MixedCore> {
   void define() override {
     State& run = execution("Run", "act", &MixedCore::act);
-    State& pause = wait("Pause", ms_to_ns(1));
+    State& pause = wait("Pause", ms_to_ns(5));
     set_initial(run);
     next(run, pause);
     next(pause, run);
@@ -196,6 +205,7 @@ TYPED_TEST(Blending, QuaternionsTurnAndAllElseSwitches) {
                                          .outputs = {{"mixed", "number", 100.0}}, .within_ns = s_to_ns(100), .blend_ns = kBlend}});
   const time_ns_t instant_ns = this->host.commit(std::move(change)).instant_ns;
   this->host.until([&] { return mixed.all().back().first >= instant_ns + kBlend; }, "the end of the blend");
+  SKIP_IF_LATE();
   this->host.stop("c");
   const auto all = mixed.from(instant_ns);
   for (const auto& [at_ns, value] : all) {
@@ -217,7 +227,8 @@ TYPED_TEST(Blending, QuaternionsTurnAndAllElseSwitches) {
 TYPED_TEST(Blending, AStopEndsTheBlend) {
   Component& component = this->deploy_old(constant(1.0));
   const time_ns_t instant_ns = this->replace(constant(10.0), this->options(s_to_ns(50)));
-  this->wait_written(instant_ns + ms_to_ns(5));
+  this->wait_written(instant_ns + ms_to_ns(20));
+  SKIP_IF_LATE();
   this->host.stop("c");
   EXPECT_EQ(ComponentState::stopped, component.task().state());
   EXPECT_EQ(0.0, this->out->all().back().second.value) << "as on_stop says";
@@ -233,11 +244,12 @@ TYPED_TEST(Blending, AStopEndsTheBlend) {
 TYPED_TEST(Blending, AnotherChangeEndsTheBlend) {
   this->deploy_old(constant(1.0));
   const time_ns_t first_ns = this->replace(constant(10.0), this->options(s_to_ns(50)));
-  this->wait_written(first_ns + ms_to_ns(5));
+  this->wait_written(first_ns + ms_to_ns(20));
+  SKIP_IF_LATE();
   Transaction change;
   change.replace_core("c", std::make_unique<FreeCore>(constant(20.0)));
   const time_ns_t second_ns = this->host.commit(std::move(change)).instant_ns;
-  this->wait_written(second_ns + ms_to_ns(5));
+  this->wait_written(second_ns + ms_to_ns(20));
   for (const auto& [at_ns, value] : this->out->from(second_ns)) EXPECT_EQ(20.0, value.value);
   EXPECT_THAT(this->record().reason, HasSubstr("ended early: the component's parts or wiring were changed"));
   this->wait_old_cleaned();
@@ -246,11 +258,11 @@ TYPED_TEST(Blending, AnotherChangeEndsTheBlend) {
 TYPED_TEST(Blending, AStepEndsTheBlend) {
   this->deploy_old(constant(1.0));
   const time_ns_t first_ns = this->replace(constant(10.0), this->options(s_to_ns(50)));
-  this->wait_written(first_ns + ms_to_ns(5));
+  this->wait_written(first_ns + ms_to_ns(20));
   Transaction end;
   end.end_shadow("c");
   const time_ns_t second_ns = this->host.commit(std::move(end)).instant_ns;
-  this->wait_written(second_ns + ms_to_ns(5));
+  this->wait_written(second_ns + ms_to_ns(20));
   for (const auto& [at_ns, value] : this->out->from(second_ns)) EXPECT_EQ(10.0, value.value);
 }
 
@@ -261,12 +273,13 @@ TYPED_TEST(Blending, AFaultOfTheOldCoreEndsTheBlend) {
     core.exposed_shell().output.write({1.0});
   });
   const time_ns_t instant_ns = this->replace(constant(10.0), this->options(s_to_ns(50)));
-  this->wait_written(instant_ns + ms_to_ns(5));
+  this->wait_written(instant_ns + ms_to_ns(20));
+  SKIP_IF_LATE();
   EXPECT_LT(this->out->all().back().second.value, 2.0);
   *is_to_fail = true;
   this->wait_end();
   const time_ns_t end_ns = this->out->all().back().first;
-  this->wait_written(end_ns + ms_to_ns(5));
+  this->wait_written(end_ns + ms_to_ns(20));
   for (const auto& [at_ns, value] : this->out->from(end_ns + 1)) EXPECT_EQ(10.0, value.value);
   EXPECT_EQ(ComponentState::running, component.task().state());
   EXPECT_THAT(this->record().reason, HasSubstr("fault of the old core: old and tired in state Run"));
@@ -281,7 +294,8 @@ TYPED_TEST(Blending, AFaultOfTheNewCoreDropsWhatIsHeld) {
         if (*is_to_fail) throw std::runtime_error("too young");
       },
       this->options(s_to_ns(50)));
-  this->wait_written(instant_ns + ms_to_ns(5));
+  this->wait_written(instant_ns + ms_to_ns(20));
+  SKIP_IF_LATE();
   *is_to_fail = true;
   this->wait_state(component, ComponentState::faulted);
   EXPECT_EQ(0.0, this->out->all().back().second.value);
@@ -297,7 +311,7 @@ TYPED_TEST(Blending, AnOverrunEndsTheBlend) {
   Component& component = this->deploy_old(
       [is_slow](FreeCore& core) {
         core.exposed_shell().output.write({1.0});
-        const time_ns_t until_ns = monotonic_now_ns() + ms_to_ns(2);
+        const time_ns_t until_ns = monotonic_now_ns() + ms_to_ns(12);
         while (*is_slow && !TestFixture::is_virtual && monotonic_now_ns() < until_ns) {
         }
       },
@@ -308,7 +322,7 @@ TYPED_TEST(Blending, AnOverrunEndsTheBlend) {
   *is_slow = true;
   this->wait_end();
   const time_ns_t end_ns = this->out->all().back().first;
-  this->wait_written(end_ns + ms_to_ns(5));
+  this->wait_written(end_ns + ms_to_ns(20));
   for (const auto& [at_ns, value] : this->out->from(end_ns)) EXPECT_EQ(10.0, value.value);
   EXPECT_THAT(this->record().reason, HasSubstr("ended early: an overrun of the component"));
   EXPECT_GE(component.task().statistics().overruns.load(), 1U);
@@ -334,14 +348,15 @@ TYPED_TEST(Blending, TheOldCoreExecutesOnTheInputsOfTheSameRelease) {
   this->architecture.connect("source", "output", "in", "write");
   std::map<time_ns_t, double> read;
   this->out = &this->architecture.template add_resource<Recorder<Number>>("out");
-  Component& component = this->add("c");
+  Component& component = this->add("c", kPeriodMs<TypeParam>);
   component.replace_core(std::make_unique<FreeCore>(follow(0.0, nullptr)));
   this->architecture.connect("c", "input", "in", "read");
   this->architecture.connect("c", "output", "out", "write");
   this->deploy();
   this->host.until([&] { return this->out->all().size() >= 3; }, "the old core");
   const time_ns_t instant_ns = this->replace(follow(10.0, &read));
-  this->wait_written(instant_ns + kBlend + ms_to_ns(5));
+  this->wait_written(instant_ns + kBlend + ms_to_ns(20));
+  SKIP_IF_LATE();
   this->host.stop("c");
   auto outputs = this->out->from(instant_ns);
   outputs.pop_back();
@@ -355,7 +370,7 @@ TYPED_TEST(Blending, AnOutputThatOneCoreWritesIsTheNewCores) {
     core.exposed_shell().held.write({1.0});
   });
   const time_ns_t first_ns = this->replace(constant(1.0));
-  this->wait_written(first_ns + kBlend + ms_to_ns(5));
+  this->wait_written(first_ns + kBlend + ms_to_ns(20));
   this->wait_end();
   EXPECT_TRUE(this->held->from(first_ns).empty()) << "which the new core does not write";
   (*this->host).settle_probations();
@@ -363,7 +378,8 @@ TYPED_TEST(Blending, AnOutputThatOneCoreWritesIsTheNewCores) {
     core.exposed_shell().output.write({1.0});
     core.exposed_shell().held.write({5.0});
   });
-  this->wait_written(second_ns + ms_to_ns(5));
+  this->wait_written(second_ns + ms_to_ns(20));
+  SKIP_IF_LATE();
   const auto written = this->held->from(second_ns);
   ASSERT_FALSE(written.empty());
   EXPECT_EQ(5.0, written.front().second.value) << "which the old core does not write";
@@ -373,6 +389,7 @@ TYPED_TEST(Blending, MaxSlewLimitsTheBlend) {
   this->deploy_old(constant(0.0), {.max_slew = {{"output.value", 50.0}}});
   const time_ns_t instant_ns = this->replace(constant(10.0));  // 167 per second
   this->wait_written(instant_ns + ms_to_ns(300));
+  SKIP_IF_LATE();
   double last = 0.0;
   time_ns_t last_ns = this->out->all().front().first;
   for (const auto& [at_ns, value] : this->out->all()) {
@@ -391,7 +408,8 @@ TYPED_TEST(Blending, APromotedCandidateBlends) {
   Transaction promote;
   promote.promote("c", {.bumpless = this->options()});
   const time_ns_t instant_ns = this->host.commit(std::move(promote)).instant_ns;
-  this->wait_written(instant_ns + kBlend + ms_to_ns(5));
+  this->wait_written(instant_ns + kBlend + ms_to_ns(20));
+  SKIP_IF_LATE();
   for (const auto& [at_ns, value] : this->out->all())
     EXPECT_NEAR(10.0 * this->weight(at_ns, instant_ns), value.value, 1e-12);
 }
@@ -412,7 +430,29 @@ TYPED_TEST(Blending, WhatCannotGoOverIsRefused) {
   };
   refused({.bumpless = this->options(-1)}, "blend_s");
   refused({.bumpless = this->options(s_to_ns(60) + 1)}, "0 to 60 s");
+  refused({.bumpless = BumplessOptions{.blend_ns = kBlend}}, "needs the outputs that it bounds");
   refused({.probation = ProbationOptions{.duration_ns = s_to_ns(1)}, .bumpless = this->options()}, "one of blend_s and probation_s");
+}
+
+TYPED_TEST(Blending, AFallbackCoreDoesNotGoOver) {
+  const auto is_to_fail = std::make_shared<std::atomic<bool>>(false);
+  this->out = &this->architecture.template add_resource<Recorder<Number>>("out");
+  Component& component = this->add("c", kPeriodMs<TypeParam>);
+  component.replace_core(std::make_unique<FreeCore>([is_to_fail](FreeCore& core) {
+    if (*is_to_fail) throw std::runtime_error("a fault");
+    core.exposed_shell().output.write({1.0});
+  }));
+  component.set_fallback(std::make_unique<FreeCore>(constant(2.0)));
+  this->architecture.connect("c", "output", "out", "write");
+  this->deploy();
+  *is_to_fail = true;
+  this->host.until([&] { return !this->out->all().empty() && this->out->all().back().second.value == 2.0; }, "the fallback");
+  std::string text;
+  EXPECT_EQ(ErrorCode::invalid_argument, this->code_of([&] { this->replace(constant(3.0)); }, &text));
+  EXPECT_THAT(text, HasSubstr("leave out blend_s"));
+  this->replace(constant(3.0), this->options(0));
+  this->wait_written((*this->host).now_ns());
+  EXPECT_EQ(3.0, this->out->all().back().second.value);
 }
 
 class BlendThreads : public Blending<OnThreads> {};
@@ -420,7 +460,7 @@ class BlendThreads : public Blending<OnThreads> {};
 TEST_F(BlendThreads, TheComponentsThreadAllocatesNothing) {
   Component& component = deploy_old(constant(0.0));
   const time_ns_t instant_ns = replace(constant(10.0));
-  wait_written(instant_ns + kBlend + ms_to_ns(5));
+  wait_written(instant_ns + kBlend + ms_to_ns(20));
   wait_end();
   EXPECT_EQ(0U, component.task().counters().allocations());
 }

@@ -87,6 +87,19 @@ def test_a_change_by_steps_with_its_handover(plan: Plan) -> None:
     assert after == now
 
 
+def test_a_blend_costs_the_time_of_both_cores(plan: Plan) -> None:
+    value = "{bumpless: {outputs: {OUTPUT: 1}, blend_s: 0.5}}"
+    change = AGAIN.replace("Timed}", f"Timed, value: '{value}'}}")
+    status, out, err = plan(TIMED, change, "--json")
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    now = {one["name"]: one["response"]["response_ns"] for one in told["components"]}
+    after = {name: one["response_ns"] for name, one in told["changes"][0]["after"]["responses"].items()}
+    assert after == {"one": 2 * now["one"], "low": now["low"] + now["one"]}
+    at_once = json.loads(plan(TIMED, change.replace("blend_s: 0.5", "blend_s: 0"), "--json")[1])
+    assert at_once["changes"][0]["after"]["responses"]["one"]["response_ns"] == now["one"]
+
+
 def test_times_of_one_core_are_not_those_of_another(plan: Plan) -> None:
     status, out, _ = plan(TIMED, "- {kind: replace_core, target: one, name: executor_tests/HalfTimed}\n")
     assert status == 3

@@ -78,7 +78,7 @@ def test_a_lookup_has_a_limit_for_each_hop(monkeypatch: pytest.MonkeyPatch):
 def test_a_shadow_costs_what_it_adds(monkeypatch: pytest.MonkeyPatch):
     calls = {"read": 2, "write": 10, "tapped_read": 14, "tapped_write": 20, "watched_write": 21}
     calls |= {"limited_write": 30, "capture": 7}
-    times_us = {"plain": 8, "shadowed": 11, "waking": 12, "probation": 9}
+    times_us = {"plain": 8, "shadowed": 11, "waking": 12, "probation": 9, "blended": 10}
     found = {f"{name}_ps": [1000 * each] for name, each in calls.items()}
     found |= {f"{name}_ns": [1000 * each] for name, each in times_us.items()}
     _with(monkeypatch, found | {"releases": 60, "compared": 59}, {0})
