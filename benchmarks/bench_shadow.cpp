@@ -266,11 +266,11 @@ void blend(mauve::Deployer& deployer, mauve::Component& component, CpuTimes& tim
   Timed& fresh = *core;
   auto& old = component.core_as<Timed>();
   mauve::Transaction transaction;
-  transaction.replace_core("pipe", std::move(core),
-                           mauve::ReplaceOptions{.bumpless = mauve::BumplessOptions{
-                                                     .outputs = {{"torque", "first", 1e300}},
-                                                     .within_ns = mauve::s_to_ns(30),
-                                                     .blend_ns = mauve::s_to_ns(60)}});
+  transaction.replace_core(
+      "pipe", std::move(core),
+      mauve::ReplaceOptions{.bumpless = mauve::BumplessOptions{.outputs = {{"torque", "first", 1e300}},
+                                                               .within_ns = mauve::s_to_ns(30),
+                                                               .blend_ns = mauve::s_to_ns(60)}});
   deployer.commit(std::move(transaction), {});
   old.times = nullptr;
   fresh.times = &times;

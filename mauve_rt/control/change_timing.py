@@ -74,7 +74,7 @@ def handovers_of(steps: Iterable[Step], cores: Mapping[str, str], registry: Plug
 def with_blends(
     machines: Iterable[Machine], before: Mapping[str, Machine], steps: Iterable[Step]
 ) -> list[Machine]:
-    """While the outputs of both cores go over (blend_s), the states of the old core come after those of the new one.
+    """In a blend (blend_s) the states of the old core come after those of the new one, in each release.
 
     `before`: the components before the change, by name.
     """
@@ -96,7 +96,7 @@ def _blends(step: Step) -> bool:
 
 
 def _with_both_cores(machine: Machine, old: Machine) -> Machine:
-    """Each release costs the guards at the end of a wait, then the states up to the next wait: of both cores."""
+    """A release costs the guards at the end of a wait, then the states up to the next wait."""
     states = {state.name: state for state in old.states}
     return replace(
         machine,
@@ -118,9 +118,11 @@ def _with_release_of(wait: State, old: Mapping[str, State]) -> ExecutionTime:
     same = old[wait.name]
     own_ns = _sum(same.time.ns, [costliest(following) for following in same.successors])
     if own_ns is None or wait.time.ns is None:
-        return ExecutionTime(why_missing="both cores execute during a blend, and a time of one of them is missing")
+        return ExecutionTime(why_missing="both cores execute in a blend, and a time of one is missing")
     is_measured = wait.time.is_measured or any(state.time.is_measured for state in old.values())
-    return ExecutionTime(wait.time.ns + own_ns, "with the old core, during the blend", is_measured=is_measured)
+    return ExecutionTime(
+        wait.time.ns + own_ns, "with the old core, during the blend", is_measured=is_measured
+    )
 
 
 def _sum(first: int | None, rest: Iterable[int | None]) -> int | None:

@@ -70,9 +70,7 @@ def read_bumpless(value: object) -> Bumpless:
     blend = value.get("blend_s", 0.0)
     if not _is_number(blend) or not 0 <= blend <= MAX_BLEND_S:
         raise ValueError(f"bumpless: blend_s: expected 0 to {MAX_BLEND_S:g} s, found {blend}")
-    return Bumpless(
-        outputs=outputs, within_s=float(within), budget_us=float(budget), blend_s=float(blend)
-    )
+    return Bumpless(outputs=outputs, within_s=float(within), budget_us=float(budget), blend_s=float(blend))
 
 
 def _is_number(value: object) -> bool:

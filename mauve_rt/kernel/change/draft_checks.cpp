@@ -135,14 +135,17 @@ void Draft::check_bumpless(const DraftComponent& component) const {
   if (!deployed_ || component.is_added)
     refuse(ErrorCode::not_configured, "only a component of a deployed architecture is changed without a bump",
            "a component of a deployed architecture", "deploy it first, or leave `bumpless` out");
-  const bool is_changed = component.shell_step != 0 || component.fsm_step != 0 || component.configure_step != 0 ||
-                          !component.properties.empty() || component.wires != component.wires_before;
+  const bool is_changed = component.shell_step != 0 || component.fsm_step != 0 ||
+                          component.configure_step != 0 || !component.properties.empty() ||
+                          component.wires != component.wires_before;
   if (is_changed)
-    refuse(ErrorCode::invalid_argument, "a bumpless change replaces the core of its component, and nothing else",
+    refuse(ErrorCode::invalid_argument,
+           "a bumpless change replaces the core of its component, and nothing else",
            "no new shell or fsm, no wiring, property or configure step of the component",
            "make these changes in a transaction before");
   if (component.bumpless->blend_ns != 0 && component.probation)
-    refuse(ErrorCode::invalid_argument, "a core on probation goes in at once: the old core must stay as it is",
+    refuse(ErrorCode::invalid_argument,
+           "a core on probation goes in at once: the old core must stay as it is",
            "one of blend_s and probation_s", "leave out one of both");
   const auto others = std::count_if(components_.begin(), components_.end(),
                                     [](const DraftComponent& each) { return each.bumpless.has_value(); });

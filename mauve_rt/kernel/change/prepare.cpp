@@ -311,7 +311,8 @@ std::shared_ptr<Shadow> TransactionCommit::Work::prepare_candidate(DraftComponen
     require_no_shadow(*draft_, changed);
     component.settle_shadow();
     const time_ns_t period_ns = component.task().grid().period_ns;
-    const time_ns_t budget_ns = options.budget_ns != 0 ? options.budget_ns : std::max<time_ns_t>(period_ns, 1);
+    const time_ns_t budget_ns =
+        options.budget_ns != 0 ? options.budget_ns : std::max<time_ns_t>(period_ns, 1);
     candidate = std::make_shared<Shadow>(component,
                                          ShadowParts{.shell = make_shadow_shell(component),
                                                      .core = std::move(changed.fresh.core),
@@ -359,7 +360,8 @@ void TransactionCommit::Work::give_back_candidates() noexcept {
 
 /// Of a bumpless change that is not made: a candidate that was there before goes on.
 void TransactionCommit::Work::give_back_candidate(const DraftComponent& changed) noexcept {
-  const std::shared_ptr<Shadow>& candidate = changed.promoted != nullptr ? changed.promoted : changed.candidate;
+  const std::shared_ptr<Shadow>& candidate =
+      changed.promoted != nullptr ? changed.promoted : changed.candidate;
   if (candidate == nullptr) return;
   candidate->end_await();
   std::unique_ptr<CoreBase> core;

@@ -41,7 +41,8 @@ void add_message(const PortBase& port, std::string_view type, const std::vector<
 void add_places(const PortBase& port, const std::vector<FieldShape>& fields, const std::string& before,
                 BlendedPlaces& places) {
   for (const FieldShape& field : fields) {
-    if (field.arity == FieldArity::bounded || field.arity == FieldArity::sequence) continue;  // at no fixed place
+    if (field.arity == FieldArity::bounded || field.arity == FieldArity::sequence)
+      continue;  // at no fixed place
     const bool is_array = field.arity == FieldArity::fixed;
     for (std::size_t index = 0; index < (is_array ? field.size : 1); ++index) {
       const std::string path = before + field.name + (is_array ? "[" + std::to_string(index) + "]" : "");
@@ -121,7 +122,8 @@ Blend::Blend(const Shell& shell, time_ns_t duration_ns) : duration_ns_(duration_
     if (port.kind() != PortKind::write) continue;
     const std::unique_ptr<PortCell> cell = port.make_cell();
     BlendedPlaces places;
-    for (const MessageShape& message : port.messages()) add_message(port, message.type, message.fields, "", places);
+    for (const MessageShape& message : port.messages())
+      add_message(port, message.type, message.fields, "", places);
     if (cell == nullptr || (places.numbers.empty() && places.turns.empty())) continue;
     outputs_.push_back(std::make_unique<Output>(port, place, std::move(places), cell->bytes()));
   }
@@ -135,7 +137,8 @@ void Blend::begin(time_ns_t instant_ns) noexcept {
 }
 
 double Blend::weight(time_ns_t instant_ns) const noexcept {
-  return std::clamp(static_cast<double>(instant_ns - begin_ns_) / static_cast<double>(duration_ns_), 0.0, 1.0);
+  return std::clamp(static_cast<double>(instant_ns - begin_ns_) / static_cast<double>(duration_ns_), 0.0,
+                    1.0);
 }
 
 void Blend::note_old(std::size_t port, const void* value) noexcept {

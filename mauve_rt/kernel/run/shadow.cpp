@@ -197,9 +197,8 @@ bool Shadow::await_outputs() noexcept {
 }
 
 bool Shadow::measure_steps() noexcept {
-  steps_->note_first([this](std::size_t port) MAUVE_RT {
-    return capture_.is_noted(port) ? capture_.present(port) : nullptr;
-  });
+  steps_->note_first([this](std::size_t port)
+                         MAUVE_RT { return capture_.is_noted(port) ? capture_.present(port) : nullptr; });
   capture_.forget_release();
   if (!steps_->are_known()) return false;
   awaits_outputs_.store(false, std::memory_order_release);
@@ -337,10 +336,10 @@ ShadowRecord Shadow::record() const {
   const LockGuard lock(figures_mutex_);
   if (phase == kEnded) {
     record.verdict = has_blended_.load(std::memory_order_relaxed) ? ShadowVerdict::promoted
-                     : cause_ == ShadowCause::fault       ? ShadowVerdict::faulted
-                     : cause_ == ShadowCause::promotion ? ShadowVerdict::promoted
-                     : cause_ == ShadowCause::hung      ? ShadowVerdict::hung
-                                                        : ShadowVerdict::ended;
+                     : cause_ == ShadowCause::fault               ? ShadowVerdict::faulted
+                     : cause_ == ShadowCause::promotion           ? ShadowVerdict::promoted
+                     : cause_ == ShadowCause::hung                ? ShadowVerdict::hung
+                                                                  : ShadowVerdict::ended;
     record.end_ns = ended_ns_;
     record.reason = reason();
   }

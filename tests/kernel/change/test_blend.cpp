@@ -103,7 +103,9 @@ class Blending : public OnBothHosts<Way> {
     return component;
   }
   static BumplessOptions options(time_ns_t blend_ns = kBlend) {
-    return {.outputs = {{.port = "output", .field = "value", .step = 100.0}}, .within_ns = s_to_ns(100), .blend_ns = blend_ns};
+    return {.outputs = {{.port = "output", .field = "value", .step = 100.0}},
+            .within_ns = s_to_ns(100),
+            .blend_ns = blend_ns};
   }
   /// Returns T.
   time_ns_t replace(const Law& law, const BumplessOptions& with = options()) {
@@ -168,7 +170,8 @@ TYPED_TEST(Blending, OutputsGoOverLinearly) {
   EXPECT_EQ(Verdict::promoted, this->record().verdict);
   EXPECT_EQ("the candidate is the component's core now", this->record().reason);
   const auto first = this->out->from(instant_ns).front();
-  EXPECT_NEAR(first.second.value, this->record().steps.front().step, 1e-12) << "the step is that of the blend";
+  EXPECT_NEAR(first.second.value, this->record().steps.front().step, 1e-12)
+      << "the step is that of the blend";
 }
 
 struct MixedShell : Shell {
@@ -198,11 +201,13 @@ TYPED_TEST(Blending, QuaternionsTurnAndAllElseSwitches) {
   const double angle = std::numbers::pi / 2.0;
   // The other quaternion of a rotation by that angle: the shorter arc counts.
   const Quaternion turn{.z = -std::sin(angle / 2.0), .w = -std::cos(angle / 2.0)};
-  const Mixed fresh{.number = 4.0, .small = 2.0F, .whole = 7, .on = true, .list = {1.0, std::nan("")}, .turn = turn};
+  const Mixed fresh{
+      .number = 4.0, .small = 2.0F, .whole = 7, .on = true, .list = {1.0, std::nan("")}, .turn = turn};
   Transaction change;
   change.replace_core("c", std::make_unique<MixedCore>(fresh),
-                      ReplaceOptions{.bumpless = BumplessOptions{
-                                         .outputs = {{"mixed", "number", 100.0}}, .within_ns = s_to_ns(100), .blend_ns = kBlend}});
+                      ReplaceOptions{.bumpless = BumplessOptions{.outputs = {{"mixed", "number", 100.0}},
+                                                                 .within_ns = s_to_ns(100),
+                                                                 .blend_ns = kBlend}});
   const time_ns_t instant_ns = this->host.commit(std::move(change)).instant_ns;
   this->host.until([&] { return mixed.all().back().first >= instant_ns + kBlend; }, "the end of the blend");
   SKIP_IF_LATE();
@@ -418,20 +423,21 @@ TYPED_TEST(Blending, WhatCannotGoOverIsRefused) {
   this->deploy_old(constant(0.0));
   const auto refused = [&](const ReplaceOptions& with, const char* text) {
     std::string found;
-    EXPECT_EQ(ErrorCode::invalid_argument,
-              this->code_of(
-                  [&] {
-                    Transaction change;
-                    change.replace_core("c", std::make_unique<FreeCore>(constant(10.0)), with);
-                    this->host.commit(std::move(change));
-                  },
-                  &found));
+    EXPECT_EQ(ErrorCode::invalid_argument, this->code_of(
+                                               [&] {
+                                                 Transaction change;
+                                                 change.replace_core(
+                                                     "c", std::make_unique<FreeCore>(constant(10.0)), with);
+                                                 this->host.commit(std::move(change));
+                                               },
+                                               &found));
     EXPECT_THAT(found, HasSubstr(text));
   };
   refused({.bumpless = this->options(-1)}, "blend_s");
   refused({.bumpless = this->options(s_to_ns(60) + 1)}, "0 to 60 s");
   refused({.bumpless = BumplessOptions{.blend_ns = kBlend}}, "needs the outputs that it bounds");
-  refused({.probation = ProbationOptions{.duration_ns = s_to_ns(1)}, .bumpless = this->options()}, "one of blend_s and probation_s");
+  refused({.probation = ProbationOptions{.duration_ns = s_to_ns(1)}, .bumpless = this->options()},
+          "one of blend_s and probation_s");
 }
 
 TYPED_TEST(Blending, AFallbackCoreDoesNotGoOver) {
@@ -446,7 +452,8 @@ TYPED_TEST(Blending, AFallbackCoreDoesNotGoOver) {
   this->architecture.connect("c", "output", "out", "write");
   this->deploy();
   *is_to_fail = true;
-  this->host.until([&] { return !this->out->all().empty() && this->out->all().back().second.value == 2.0; }, "the fallback");
+  this->host.until([&] { return !this->out->all().empty() && this->out->all().back().second.value == 2.0; },
+                   "the fallback");
   std::string text;
   EXPECT_EQ(ErrorCode::invalid_argument, this->code_of([&] { this->replace(constant(3.0)); }, &text));
   EXPECT_THAT(text, HasSubstr("leave out blend_s"));
