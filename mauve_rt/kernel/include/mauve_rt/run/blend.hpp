@@ -51,7 +51,7 @@ class Blend {
   /// The ports hold nothing any longer. May be called again. [rt], the component's thread, or one that has claimed the component
   void end() MAUVE_RT;
 
-  Mutex mutex{};  // the old core executes, or is cleaned up
+  Mutex mutex{};                     // the old core executes, or is cleaned up
   std::unique_ptr<CoreBase> core{};  // the old one, from T on
   CoreBinding binding{};             // of the old core, to the shadow's fsm
   std::string fault{};               // of the old core; empty: none

@@ -54,15 +54,15 @@ const char* to_string(ShadowVerdict verdict) MAUVE_RT;
 enum class ShadowCause : std::uint8_t {
   none,
   fault,
-  request,    // a step end_shadow
-  changed,    // the component's parts or wiring were changed
-  closed,     // the component was cleaned up or removed, or its host was shut down
-  promotion,  // a step promote
-  lost,       // a step promote was refused, and the candidate was cleaned up with it
-  hung,       // a state of the candidate did not end
-  overrun,    // of the component, in a blend
-  stop,       // of the component, in a blend
-  live_fault, // of the new core, in a blend
+  request,     // a step end_shadow
+  changed,     // the component's parts or wiring were changed
+  closed,      // the component was cleaned up or removed, or its host was shut down
+  promotion,   // a step promote
+  lost,        // a step promote was refused, and the candidate was cleaned up with it
+  hung,        // a state of the candidate did not end
+  overrun,     // of the component, in a blend
+  stop,        // of the component, in a blend
+  live_fault,  // of the new core, in a blend
 };
 
 /// One shadow as anyone may see it.
@@ -180,11 +180,13 @@ class Shadow {
 
   /// Whether the outputs are to go over from those of this core. [rt]
   bool may_blend(const CoreBase& live) const MAUVE_RT {
-    return blend_ != nullptr && blend_->binding.core == &live && phase_.load(std::memory_order_acquire) == kRunning;
+    return blend_ != nullptr && blend_->binding.core == &live &&
+           phase_.load(std::memory_order_acquire) == kRunning;
   }
   /// The old core goes on here, from that wait of this index, which ends at `due_ns`; w is 0 at the instant. False: the shadow has
   /// ended, and the core is still the caller's. [rt] as far as the core's bind_shell() is
-  bool begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_ns_t due_ns, time_ns_t instant_ns) MAUVE_RT;
+  bool begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_ns_t due_ns, time_ns_t instant_ns)
+      MAUVE_RT;
   /// Whether outputs are held. [rt]
   bool is_holding() const MAUVE_RT { return is_holding_.load(std::memory_order_acquire); }
   /// Before the wait that ends a release: executes the old core, and returns the time that its states declare in virtual time. [rt] as
@@ -201,9 +203,7 @@ class Shadow {
   /// It was promoted, and a listed output of the new core is yet to be measured. [rt], any thread
   bool awaits_outputs() const MAUVE_RT { return awaits_outputs_.load(std::memory_order_acquire); }
   /// It has ended, and the component's ports still refer to it. [rt], any thread
-  bool is_to_settle() const MAUVE_RT {
-    return has_ended() && capture_.is_attached() && !awaits_outputs();
-  }
+  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached() && !awaits_outputs(); }
 
   // ---- who executes: the shadow's thread, or a simulation
 
