@@ -43,7 +43,8 @@ void check_options(const BumplessOptions& options, const std::string& component)
   if (options.blend_ns < 0 || options.blend_ns > Blend::kLongest)
     refuse("the outputs cannot go over for that long", "blend_s",
            "0 to " + std::to_string(Blend::kLongest / s_to_ns(1)) + " s",
-           number_text(static_cast<double>(options.blend_ns) / 1e9) + " s", "give a shorter time: both cores execute for it");
+           number_text(static_cast<double>(options.blend_ns) / 1e9) + " s",
+           "give a shorter time: both cores execute for it");
   if (options.outputs.empty() || options.outputs.size() > kMostOutputs)
     refuse("a bumpless change needs the outputs that it bounds", "outputs",
            "1 to " + std::to_string(kMostOutputs) + " outputs", std::to_string(options.outputs.size()),
