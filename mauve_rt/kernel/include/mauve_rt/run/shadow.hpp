@@ -185,8 +185,8 @@ class Shadow {
   }
   /// The old core goes on here, from that wait of this index, which ends at `due_ns`; w is 0 at the instant. False: the shadow has
   /// ended, and the core is still the caller's. [rt] as far as the core's bind_shell() is
-  bool begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_ns_t due_ns, time_ns_t instant_ns)
-      MAUVE_RT;
+  bool begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_ns_t due_ns,
+                   time_ns_t instant_ns) noexcept;
   /// Whether outputs are held. [rt]
   bool is_holding() const MAUVE_RT { return is_holding_.load(std::memory_order_acquire); }
   /// Before the wait that ends a release: executes the old core, and returns the time that its states declare in virtual time. [rt] as
