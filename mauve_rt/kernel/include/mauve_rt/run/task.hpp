@@ -182,7 +182,7 @@ class Task final : public Waiter {
   /// The component's parts or wiring change, which ends its shadow. [rt], in a take.
   void end_shadow(ShadowCause why) MAUVE_RT;
   /// The outputs go over from those of this core, which has just been replaced. False: they do not, and it is still the caller's. [rt]
-  /// as Shadow::begin_blend(), in a take.
+  /// as far as the core's bind_shell() is, in a take.
   bool begin_blend(Shadow& shadow, std::unique_ptr<CoreBase>& old, time_ns_t instant_ns) noexcept;
   /// No thread uses the shadow any more afterwards; the component may have another by now. [non-rt], the component claimed.
   void forget_shadow(const Shadow& shadow) noexcept { shadow_.revoke(shadow, kForever); }
