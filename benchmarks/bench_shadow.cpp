@@ -4,10 +4,10 @@
 //   bench_shadow [--blocks 41] [--calls 1024] [--priority 80] [--cpu 0] [--turns 10] [--releases 50]
 // Prints {"read_ps": [...], "tapped_read_ps": [...], "write_ps": [...], "tapped_write_ps": [...], "watched_write_ps": [...],
 // "limited_write_ps": [...], "capture_ps": [...]} in picoseconds a call, of values of 16 bytes. A deployed 1 kHz component that reads and writes once a
-// release follows, with {"plain_ns": [...], "shadowed_ns": [...], "awaiting_ns": [...], "waking_ns": [...], "probation_ns": [...]}:
-// CPU time of the component's thread from one release to the next. "awaiting": a bumpless change waits for near outputs. "waking" has
-// no shadow, and wakes a sleeping ordinary thread in each release. "releases" and "compared": of the releases with a shadow, those
-// that the candidate executed.
+// release follows, with {"plain_ns": [...], "shadowed_ns": [...], "awaiting_ns": [...], "waking_ns": [...], "probation_ns": [...],
+// "blended_ns": [...]}: CPU time of the component's thread from one release to the next. "awaiting": a bumpless change waits for near
+// outputs. "waking" has no shadow, and wakes a sleeping ordinary thread in each release. "blended" is a blend of two equal cores,
+// "early" the blends that an overrun ended. "releases" and "compared": of the releases with a shadow, those that the candidate executed.
 // Then the component has a neighbour of 1 kHz on its CPU, of the next lower priority. {"neighbour_plain_ns": [...],
 // "neighbour_awaiting_ns": [...]}: the neighbour's wake-up latencies; {"blackout_ns": [...], "bumpless_blackout_ns": [...]}: of
 // changes of the core, plain and bumpless, by turns.
@@ -24,6 +24,14 @@
 #include "support/micro.hpp"
 #include "support/values.hpp"
 
+namespace bench {
+struct Torque {
+  double first{};
+  double second{};
+};
+}  // namespace bench
+MAUVE_TYPE(bench::Torque, "bench_msgs/msg/Torque", first, second)
+
 namespace {
 
 using bench::Small;
@@ -35,6 +43,11 @@ constexpr double kLeast = -1e12, kMost = 1e12;  // of the output; no value is be
 struct PipeShell : bench::WorkerShell {
   mauve::ReadPort<Small>& input = read_port<Small>("input");
   mauve::WritePort<Small>& output = write_port<Small>("output");
+};
+
+/// With numbers that go over in a blend.
+struct RobotShell : PipeShell {
+  mauve::WritePort<bench::Torque>& torque = write_port<bench::Torque>("torque");
 };
 
 // ---- ports alone
@@ -160,28 +173,29 @@ class CpuTimes {
 /// Reads what it has written in the release before.
 struct Passing : bench::Worker {
   void work() override {
-    auto& pipe = static_cast<PipeShell&>(shell());
-    const Small value = pipe.input.read().value;
-    pipe.output.write({value.first + 1, value.second + 1});
+    auto& robot = static_cast<RobotShell&>(shell());
+    const Small value = robot.input.read().value;
+    robot.output.write({value.first + 1, value.second + 1});
+    robot.torque.write({static_cast<double>(value.first), 1.0});
   }
 };
 
 /// Never near a passing one.
 struct Far : Passing {
   void work() override {
-    auto& pipe = static_cast<PipeShell&>(shell());
-    pipe.output.write({pipe.input.read().value.first + 2, 0});
+    auto& robot = static_cast<RobotShell&>(shell());
+    robot.output.write({robot.input.read().value.first + 2, 0});
   }
 };
 
 struct Timed : Passing {
   void work() override {
-    if (times != nullptr) times->note();
+    if (CpuTimes* const noted = times.load(std::memory_order_relaxed)) noted->note();
     Passing::work();
   }
-  void take(mauve::CoreBase& old) noexcept override { times = static_cast<Timed&>(old).times; }
+  void take(mauve::CoreBase& old) noexcept override { times = static_cast<Timed&>(old).times.load(); }
 
-  CpuTimes* times{nullptr};
+  std::atomic<CpuTimes*> times{nullptr};  // of one of both cores in a blend
 };
 
 /// An ordinary thread of the lowest priority that sleeps, as the shadow's.
@@ -237,7 +251,7 @@ struct Waking : Timed {
 mauve::Transaction begin_shadow() {
   mauve::Transaction transaction;
   transaction.shadow("pipe", std::make_unique<Passing>(), {.budget_ns = mauve::ms_to_ns(1)},
-                     std::make_unique<PipeShell>());
+                     std::make_unique<RobotShell>());
   return transaction;
 }
 mauve::Transaction end_shadow() {
@@ -290,12 +304,30 @@ void while_waiting(mauve::Deployer& deployer, const Function& measure) {
 
 mauve::Component& add_pipe(mauve::Architecture& architecture, const bench::Options& options) {
   architecture.add_resource<mauve::SharedData<Small>>("data");
-  mauve::Component& component = architecture.add_component<PipeShell, Timed, bench::WorkerFsm>(
+  architecture.add_resource<mauve::SharedData<bench::Torque>>("torque");
+  mauve::Component& component = architecture.add_component<RobotShell, Timed, bench::WorkerFsm>(
       "pipe", mauve::TaskSettings{.priority = options.priority(), .cpus = {options.cpu()}});
   component.set_property("period_us", kPeriodUs);
   architecture.connect("pipe", "input", "data", "read");
   architecture.connect("pipe", "output", "data", "write");
+  architecture.connect("pipe", "torque", "torque", "write");
   return component;
+}
+
+/// Both cores execute until the shadow is ended.
+void blend(mauve::Deployer& deployer, mauve::Component& component, CpuTimes& times) {
+  auto core = std::make_unique<Timed>();
+  Timed& fresh = *core;
+  auto& old = component.core_as<Timed>();
+  mauve::Transaction transaction;
+  transaction.replace_core(
+      "pipe", std::move(core),
+      mauve::ReplaceOptions{.bumpless = mauve::BumplessOptions{.outputs = {{"torque", "first", 1e300}},
+                                                               .within_ns = mauve::s_to_ns(30),
+                                                               .blend_ns = mauve::s_to_ns(60)}});
+  deployer.commit(std::move(transaction), {});
+  old.times = nullptr;
+  fresh.times = &times;
 }
 
 void measure_releases(const bench::Options& options, bench::JsonLine& line) {
@@ -304,9 +336,10 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   Sleeper sleeper;  // outlives the cores
   CpuTimes times(static_cast<std::size_t>(20 * turns * (count + 100)));
   mauve::Architecture architecture;
+  mauve::Component& component = add_pipe(architecture, options);
   auto first = std::make_unique<Timed>();
   first->times = &times;
-  add_pipe(architecture, options).replace_core(std::move(first));
+  component.replace_core(std::move(first));
   architecture.configure();
   mauve::Deployer deployer(architecture);
   deployer.deploy();
@@ -316,6 +349,8 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
   std::vector<std::int64_t> awaiting;
   std::vector<std::int64_t> waking;
   std::vector<std::int64_t> probation;
+  std::vector<std::int64_t> blended;
+  std::int64_t early = 0;
   std::int64_t releases = 0;
   std::int64_t compared = 0;
   for (std::int64_t turn = 0; turn < turns; ++turn) {
@@ -332,6 +367,13 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
     deployer.commit(put_on_probation(), {});
     times.collect(probation, count);
     deployer.commit(put_in(std::make_unique<Timed>()), {});
+    blend(deployer, component, times);
+    times.collect(blended, count);
+    if (deployer.shadows().back().verdict == mauve::ShadowVerdict::running) {
+      deployer.commit(end_shadow(), {});
+    } else {
+      ++early;
+    }
   }
   deployer.shutdown();
   line.add("plain_ns", plain)
@@ -339,6 +381,8 @@ void measure_releases(const bench::Options& options, bench::JsonLine& line) {
       .add("awaiting_ns", awaiting)
       .add("waking_ns", waking)
       .add("probation_ns", probation)
+      .add("blended_ns", blended)
+      .add("early", early)
       .add("releases", releases)
       .add("compared", compared);
 }

@@ -12,7 +12,7 @@ from settings import Settings
 _PS_PER_NS = 1000
 _NS_PER_US = 1000
 _PACE_NS = 1000
-_RELEASES = ("plain", "shadowed", "awaiting", "waking", "probation")
+_RELEASES = ("plain", "shadowed", "awaiting", "waking", "probation", "blended")
 _SHADOW_US = 5.0  # 0.5 % of the period; most of it is the system call that wakes the shadow's thread
 _LOOKUP_NS_PER_HOP = 1000
 _ONE_CPU = "this machine has one CPU"
@@ -167,7 +167,7 @@ def shadow_rows(settings: Settings) -> Iterator[Row]:
     medians = [
         {name: percentile(found[f"{name}_ns"], 50) / _NS_PER_US for name in _RELEASES} for found in rounds
     ]
-    note = "two ports of 16 B; CPU time of the component's thread from one release to the next, p50; "
+    note = "three ports of 16 B; CPU time of the component's thread from one release to the next, p50; "
     note += f"the shadow executed {sum(found['compared'] for found in rounds)} of "
     note += f"{sum(found['releases'] for found in rounds)} releases"
     added = [each["shadowed"] - each["plain"] for each in medians]
@@ -178,6 +178,7 @@ def shadow_rows(settings: Settings) -> Iterator[Row]:
         "awaiting": "while a bumpless change waits for near outputs",
         "waking": "that wakes a sleeping ordinary thread, without a shadow",
         "probation": "on probation with an output limit",
+        "blended": "in a blend of two equal cores",
     }
     for name, what in whats.items():
         yield compared(

@@ -15,15 +15,20 @@ void bind_output_steps(py::module_& module) {
       .def_readonly("step", &GreatestStep::step, ">= 0, in the unit of the number.");
   py::class_<BumplessOptions>(module, "BumplessOptions",
                               "A core goes in only where its outputs are near those of the core in force.")
-      .def(py::init([](const std::vector<GreatestStep>& outputs, time_ns_t within_ns, time_ns_t budget_ns) {
-             return BumplessOptions{.outputs = outputs, .within_ns = within_ns, .budget_ns = budget_ns};
+      .def(py::init([](const std::vector<GreatestStep>& outputs, time_ns_t within_ns, time_ns_t budget_ns,
+                       time_ns_t blend_ns) {
+             return BumplessOptions{
+                 .outputs = outputs, .within_ns = within_ns, .budget_ns = budget_ns, .blend_ns = blend_ns};
            }),
            py::arg("outputs"), py::kw_only(), py::arg("within_ns") = BumplessOptions{}.within_ns,
-           py::arg("budget_ns") = 0,
-           "`budget_ns`: of the candidate for one release; 0: the component's period.")
+           py::arg("budget_ns") = 0, py::arg("blend_ns") = 0,
+           "`budget_ns`: of the candidate for one release; 0: the component's period. `blend_ns`: so long "
+           "both cores execute, and the "
+           "outputs go over linearly; 0: at once.")
       .def_readonly("outputs", &BumplessOptions::outputs)
       .def_readonly("within_ns", &BumplessOptions::within_ns, "So long such an instant is waited for.")
-      .def_readonly("budget_ns", &BumplessOptions::budget_ns);
+      .def_readonly("budget_ns", &BumplessOptions::budget_ns)
+      .def_readonly("blend_ns", &BumplessOptions::blend_ns);
   py::class_<OutputStep>(module, "OutputStep",
                          "One output of a bumpless change; fields as mauve_msgs/msg/OutputStep.")
       .def_readonly("output", &OutputStep::output)

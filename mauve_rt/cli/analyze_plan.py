@@ -8,7 +8,13 @@ from mauve_rt.analysis.machines import Machine
 from mauve_rt.analysis.plan import Handovers
 from mauve_rt.analysis.study import Study, Surroundings, study
 from mauve_rt.cli.analyzed import Analyzed, analyzed
-from mauve_rt.control.change_timing import budget_ns, handovers_of, judged_change, with_times_of_core
+from mauve_rt.control.change_timing import (
+    budget_ns,
+    handovers_of,
+    judged_change,
+    with_blends,
+    with_times_of_core,
+)
 from mauve_rt.control.simulated_runtime import SimulatedRuntime
 from mauve_rt.file_schema.file_kind import FileKind
 from mauve_rt.model import ArchitectureModel, PluginIndex
@@ -159,6 +165,7 @@ def _by_steps(change: Change, path: Path, model: ArchitectureModel, components: 
         elif part.name in there:
             machine = with_times_of_core(machine, part, model.components[part.name], registry)
         machines.append(machine)
+    machines = with_blends(machines, known, change.steps)
     cores = {part.name: part.core for part in after.components if part.name in there}
     return machines, _threads_after(model, change, machines), handovers_of(change.steps, cores, registry)
 

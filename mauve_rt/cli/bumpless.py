@@ -25,13 +25,22 @@ def add_bumpless(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help=f"with --bumpless: seconds to wait for such an instant (default {_DEFAULT_WITHIN_S:g})",
     )
+    parser.add_argument(
+        "--blend",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="with --bumpless: for so many seconds both cores execute, and the outputs go over linearly from "
+        "those of the old core to those of the new one (at most 60; default 0: at once)",
+    )
 
 
 def bumpless_text(args: argparse.Namespace) -> str:
     """As YAML; empty: the change is made at once."""
     if not args.bumpless:
         return ""
-    return json.dumps({"outputs": dict(args.bumpless), "within_s": args.within})
+    blend = {"blend_s": args.blend} if args.blend else {}
+    return json.dumps({"outputs": dict(args.bumpless), "within_s": args.within, **blend})
 
 
 def _output(text: str) -> tuple[str, float]:

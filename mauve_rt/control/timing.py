@@ -11,7 +11,13 @@ from mauve_rt._kernel import ComponentDescription
 from mauve_rt.analysis.machines import Machine
 from mauve_rt.analysis.study import Study, Surroundings, study
 from mauve_rt.analysis.time_limit import time_limit
-from mauve_rt.control.change_timing import JudgedChange, handovers_of, judged_change, with_times_of_core
+from mauve_rt.control.change_timing import (
+    JudgedChange,
+    handovers_of,
+    judged_change,
+    with_blends,
+    with_times_of_core,
+)
 from mauve_rt.control.changed_parts import ChangedParts
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.threads import threads_of
@@ -98,7 +104,7 @@ class Timing:
             components = self._components(parts)
             known = {machine.name: machine for machine in components}
             changed = ChangedParts(steps, runtime, parts, uses)
-            machines = changed.machines(known)
+            machines = with_blends(changed.machines(known), known, steps)
             handovers = handovers_of(steps, changed.cores(), runtime.registry)
             lowers = not handovers and all(_is_within(one, known.get(one.name)) for one in machines)
             if lowers and not always:

@@ -1,7 +1,7 @@
 """A bumpless change of a core, as requests and steps give it: the outputs, and their greatest steps.
 
 {kind: replace_core, target: control, name: my_robot/Pid2,
- value: {bumpless: {outputs: {command.torque: 0.5}, within_s: 2}}}
+ value: {bumpless: {outputs: {command.torque: 0.5}, within_s: 2, blend_s: 0.5}}}
 """
 
 import math
@@ -14,7 +14,8 @@ from mauve_rt.file_schema.words import did_you_mean, shown
 MAX_WITHIN_S = 3_600.0
 MAX_OUTPUTS = 100
 MAX_BUDGET_US = 1e9
-_KEYS = ("outputs", "within_s", "budget_us")
+MAX_BLEND_S = 60.0
+_KEYS = ("outputs", "within_s", "budget_us", "blend_s")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +25,7 @@ class Bumpless:
     outputs: Mapping[str, float]  # "PORT.FIELD": greatest step, in the unit of the number
     within_s: float = 2.0
     budget_us: float = 0.0  # of the candidate for one release; 0: the component's period
+    blend_s: float = 0.0  # so long the outputs go over from the old core's to the new one's; 0: at once
 
     def options(self) -> BumplessOptions:
         """What the kernel takes."""
@@ -32,7 +34,10 @@ class Bumpless:
             for output, step in self.outputs.items()
         ]
         return BumplessOptions(
-            outputs, within_ns=round(self.within_s * 1e9), budget_ns=round(self.budget_us * 1e3)
+            outputs,
+            within_ns=round(self.within_s * 1e9),
+            budget_ns=round(self.budget_us * 1e3),
+            blend_ns=round(self.blend_s * 1e9),
         )
 
 
@@ -62,7 +67,10 @@ def read_bumpless(value: object) -> Bumpless:
         raise ValueError(f"bumpless: within_s: expected more than 0 to {MAX_WITHIN_S:g} s, found {within}")
     if not _is_number(budget) or not 0 <= budget <= MAX_BUDGET_US:
         raise ValueError(f"bumpless: budget_us: expected 0 to {MAX_BUDGET_US:g} us, found {budget}")
-    return Bumpless(outputs=outputs, within_s=float(within), budget_us=float(budget))
+    blend = value.get("blend_s", 0.0)
+    if not _is_number(blend) or not 0 <= blend <= MAX_BLEND_S:
+        raise ValueError(f"bumpless: blend_s: expected 0 to {MAX_BLEND_S:g} s, found {blend}")
+    return Bumpless(outputs=outputs, within_s=float(within), budget_us=float(budget), blend_s=float(blend))
 
 
 def _is_number(value: object) -> bool:

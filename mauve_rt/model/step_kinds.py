@@ -54,7 +54,8 @@ STEP_KINDS: Mapping[str, StepKind] = {
     "replace_core": StepKind(
         what="replace the core; the component keeps its pending instant. With probation_s, revert_on and "
         "releases in the value the core is on probation: a violation puts the old core back. With bumpless "
-        "it goes in only where its outputs are near those of the old core",
+        "it goes in only where its outputs are near those of the old core; with blend_s in it they go over "
+        "linearly",
         name="core",
         value="replacement",
         needs_running=True,

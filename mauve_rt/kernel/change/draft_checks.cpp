@@ -143,6 +143,10 @@ void Draft::check_bumpless(const DraftComponent& component) const {
            "a bumpless change replaces the core of its component, and nothing else",
            "no new shell or fsm, no wiring, property or configure step of the component",
            "make these changes in a transaction before");
+  if (component.bumpless->blend_ns != 0 && component.probation)
+    refuse(ErrorCode::invalid_argument,
+           "a core on probation goes in at once: the old core must stay as it is",
+           "one of blend_s and probation_s", "leave out one of both");
   const auto others = std::count_if(components_.begin(), components_.end(),
                                     [](const DraftComponent& each) { return each.bumpless.has_value(); });
   if (others > 1)

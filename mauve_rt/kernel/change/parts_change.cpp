@@ -227,10 +227,15 @@ void PartsChange::put_back() noexcept {
 
 void PartsChange::take() noexcept {
   component_.task_.end_probation(is_fallback_);
-  component_.task_.end_shadow(promotes_ ? ShadowCause::promotion : ShadowCause::changed);
+  const bool may_blend =
+      candidate_ != nullptr && parts_.core != nullptr && candidate_->may_blend(*component_.parts_.core);
+  const ShadowCause why = promotes_ ? ShadowCause::promotion : ShadowCause::changed;
+  if (!may_blend) component_.task_.end_shadow(why);
   if (parts_.core != nullptr) {
     if (!afresh_ && !unready_) promotes_ ? handover_->copy() : handover_->take();
     exchange_core();
+    if (may_blend && !component_.task_.begin_blend(*candidate_, parts_.core, instant_ns))
+      component_.task_.end_shadow(why);
   } else if (parts_.shell != nullptr) {
     component_.parts_.core->bind_shell(*parts_.shell);
   }

@@ -321,7 +321,7 @@ std::shared_ptr<Shadow> TransactionCommit::Work::prepare_candidate(DraftComponen
     changed.candidate = candidate;
     candidate->prepare(component.core());
   }
-  candidate->await_near(options.outputs, changed.is_fresh, component);
+  candidate->await_near(options, changed.is_fresh, component);
   if (options_.dry_run || changed.promoted != nullptr) return candidate;
   prefault_allocated();
   host_->run_shadow(candidate);

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "mauve_rt/base/error.hpp"
+#include "mauve_rt/run/blend.hpp"
 
 #include "base/number_text.hpp"
 #include "parts/lookup.hpp"
@@ -36,6 +37,11 @@ void check_options(const BumplessOptions& options, const std::string& component)
   if (options.budget_ns < 0)
     refuse("the candidate's budget is no length of time", "budget_us", "0 or more",
            std::to_string(options.budget_ns), "leave it out: the budget is the component's period then");
+  if (options.blend_ns < 0 || options.blend_ns > Blend::kLongest)
+    refuse("the outputs cannot go over for that long", "blend_s",
+           "0 to " + std::to_string(Blend::kLongest / s_to_ns(1)) + " s",
+           number_text(static_cast<double>(options.blend_ns) / 1e9) + " s",
+           "give a shorter time: both cores execute for it");
   if (options.outputs.empty() || options.outputs.size() > kMostOutputs)
     refuse("a bumpless change needs the outputs that it bounds", "outputs",
            "1 to " + std::to_string(kMostOutputs) + " outputs", std::to_string(options.outputs.size()),

@@ -168,7 +168,11 @@ void Shadow::start() noexcept {
 
 bool Shadow::end_release(time_ns_t instant_ns, const State* next_wait, const CoreBase* live) noexcept {
   if (measures_outputs()) [[unlikely]]
-    return measure_steps(instant_ns);
+    return measure_steps(instant_ns) && !is_holding();
+  if (is_holding()) [[unlikely]] {
+    capture_.forget_release();
+    return false;
+  }
   if (phase_.load(std::memory_order_acquire) != kRunning) return false;
   const std::int64_t from =
       next_wait != nullptr ? static_cast<std::int64_t>(next_wait->index) : ShadowCapture::kStart;
@@ -265,14 +269,42 @@ void Shadow::with_core(time_ns_t timeout_ns, const std::function<void(CoreBase&)
   use(*parts_.core);
 }
 
-void Shadow::await_near(const std::vector<GreatestStep>& outputs, bool is_fresh, Component& component) {
-  auto steps = std::make_unique<OutputSteps>(component.shell(), component_, outputs);
+void Shadow::await_near(const BumplessOptions& options, bool is_fresh, Component& component) {
+  auto steps = std::make_unique<OutputSteps>(component.shell(), component_, options.outputs);
   const auto run = lock_core(kStateEnd);
+  std::unique_ptr<Blend> blend = options.blend_ns != 0 ? make_blend(options.blend_ns, component) : nullptr;
   near_.store(kNeverNear, std::memory_order_release);
   follows_.store(!is_fresh && handover_ != nullptr, std::memory_order_relaxed);
   const LockGuard lock(figures_mutex_);
   steps_ = std::move(steps);
+  blend_ = std::move(blend);
   awaiting_.set(component.task());
+}
+
+/// The old core is bound to the fsm that the candidate executes now: that changes neither.
+std::unique_ptr<Blend> Shadow::make_blend(time_ns_t duration_ns, Component& component) {
+  CoreBase& old = component.core();
+  if (old.is_dynamic() || parts_.core->is_dynamic()) {
+    const std::string& found = old.is_dynamic() ? live_core_ : core_;
+    throw Error(ErrorCode::type_mismatch, "the outputs of a core in Python do not go over",
+                {.component = component_,
+                 .element = "blend_s",
+                 .expected = "two cores in C++",
+                 .found = found + " in Python",
+                 .remedy = "leave out blend_s"});
+  }
+  if (component.task().has_fallen_back()) {  // it is made ready anew for the next fault
+    throw Error(ErrorCode::invalid_argument, "the outputs of a fallback core do not go over",
+                {.component = component_,
+                 .element = "blend_s",
+                 .expected = "a component that does not run its fallback core",
+                 .found = "fallback " + component.core_implementation(),
+                 .remedy = "leave out blend_s"});
+  }
+  auto blend = std::make_unique<Blend>(component.shell(), duration_ns);
+  blend->binding = parts_.fsm->bind_core(old);
+  blend->binding.core = &old;
+  return blend;
 }
 
 void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
@@ -305,10 +337,11 @@ ShadowRecord Shadow::record() const {
                       .budget_ns = options_.budget_ns};
   const LockGuard lock(figures_mutex_);
   if (phase == kEnded) {
-    record.verdict = cause_ == ShadowCause::fault       ? ShadowVerdict::faulted
-                     : cause_ == ShadowCause::promotion ? ShadowVerdict::promoted
-                     : cause_ == ShadowCause::hung      ? ShadowVerdict::hung
-                                                        : ShadowVerdict::ended;
+    record.verdict = has_blended_.load(std::memory_order_relaxed) ? ShadowVerdict::promoted
+                     : cause_ == ShadowCause::fault               ? ShadowVerdict::faulted
+                     : cause_ == ShadowCause::promotion           ? ShadowVerdict::promoted
+                     : cause_ == ShadowCause::hung                ? ShadowVerdict::hung
+                                                                  : ShadowVerdict::ended;
     record.end_ns = ended_ns_;
     record.reason = reason();
   }
@@ -325,6 +358,14 @@ ShadowRecord Shadow::record() const {
 }
 
 std::string Shadow::reason() const {
+  if (has_blended_.load(std::memory_order_relaxed) && cause_ != ShadowCause::promotion) {
+    return "the candidate is the component's core now; the blend ended early: " +
+           (cause_ == ShadowCause::fault ? "fault of the old core: " + blend_->fault : words_of_cause());
+  }
+  return words_of_cause();
+}
+
+std::string Shadow::words_of_cause() const {
   switch (cause_) {
     case ShadowCause::none:
       return {};
@@ -342,13 +383,22 @@ std::string Shadow::reason() const {
       return "hung: state " + TraceNames::word(machine_.state_name()) + " of the candidate did not end";
     case ShadowCause::lost:
       return "the change was refused, and the candidate was cleaned up";
+    case ShadowCause::overrun:
+      return "an overrun of the component";
+    case ShadowCause::stop:
+      return "a stop of the component";
+    case ShadowCause::live_fault:
+      return "a fault of the new core";
   }
   return {};
 }
 
 void Shadow::retire() noexcept {
   const std::unique_lock run(run_mutex_, std::try_to_lock);  // else its own thread retires it
-  if (run.owns_lock() && has_ended()) clean_up();
+  if (!run.owns_lock() || !has_ended()) return;
+  if (blend_ == nullptr) return clean_up();
+  const std::unique_lock blend(blend_->mutex, std::try_to_lock);  // else a state of the old core does not end
+  if (blend.owns_lock()) clean_up();
 }
 
 /// run_mutex_ held, or no other thread there. A core that was suspended is another's.
@@ -356,6 +406,7 @@ void Shadow::clean_up() noexcept {
   if (is_retired_) return;
   is_retired_ = true;
   if (parts_.core != nullptr) parts_.core->cleanup();
+  if (blend_ != nullptr && blend_->core != nullptr) blend_->core->cleanup();
   parts_.fsm->cleanup();
   for (const auto& port : parts_.shell->ports()) port->disconnect();
   parts_.shell->cleanup();

@@ -109,7 +109,10 @@ void ShadowCapture::start() noexcept {
 
 void ShadowCapture::forget_release() noexcept {
   present_.has_state = false;
-  for (PortNote& note : present_.notes) note.is_noted = false;
+  for (PortNote& note : present_.notes) {
+    note.is_noted = false;
+    if (note.status == DataStatus::new_data) note.status = DataStatus::old_data;
+  }
 }
 
 const std::byte* ShadowCapture::present(std::size_t port) const noexcept {
@@ -136,11 +139,7 @@ bool ShadowCapture::end_release(time_ns_t instant_ns, std::int64_t next_from) no
   } else {
     skipped_.store(skipped_.load(std::memory_order_relaxed) + 1, std::memory_order_relaxed);
   }
-  present_.has_state = false;
-  for (PortNote& note : present_.notes) {
-    note.is_noted = false;
-    if (note.status == DataStatus::new_data) note.status = DataStatus::old_data;
-  }
+  forget_release();
   return is_free;
 }
 

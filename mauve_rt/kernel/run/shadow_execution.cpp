@@ -114,12 +114,86 @@ bool Shadow::advance_to(const ShadowCapture::Release& release) {
     }
   }
   if (machine_.due_ns() > release.instant_ns) return false;
-  machine_.skip_to(release.instant_ns);
-  machine_.release(release.instant_ns);
+  execute_wait_to_wait(release.instant_ns);
+  return true;
+}
+
+void Shadow::execute_wait_to_wait(time_ns_t instant_ns) {
+  machine_.skip_to(instant_ns);
+  machine_.release(instant_ns);
   machine_.leave_wait();
   while (machine_.enter_next() == Machine::Entered::execution) {
   }
+}
+
+// ---- a blend. No other thread uses the shell, the fsm and the machine: the shadow's thread has given the candidate's core away.
+
+bool Shadow::begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_ns_t due_ns,
+                         time_ns_t instant_ns) noexcept {
+  has_blended_.store(true, std::memory_order_relaxed);  // relaxed: the phase publishes it
+  std::uint32_t expected = kRunning;
+  if (!phase_.compare_exchange_strong(expected, kBlending, std::memory_order_acq_rel)) {
+    has_blended_.store(false, std::memory_order_relaxed);
+    return false;
+  }
+  await_outputs();
+  blend_->core = std::move(old);
+  blend_->core->bind_shell(*parts_.shell);  // of the class of the shell that it had
+  blend_->core->set_context(&machine_.context());
+  machine_.set_parts(*parts_.fsm, &blend_->binding, machine_.grid().period_ns);
+  machine_.start_in(*parts_.fsm->states()[wait], due_ns);
+  is_holding_.store(true, std::memory_order_release);
+  blend_->begin(instant_ns);
   return true;
+}
+
+time_ns_t Shadow::execute_old(time_ns_t instant_ns) noexcept {
+  const std::unique_lock executing(blend_->mutex, std::try_to_lock);  // else it has ended, and is cleaned up
+  if (!executing.owns_lock() || !is_blending() || blend_->weight(instant_ns) >= 1.0) return 0;
+  const auto& ports = parts_.shell->ports();
+  for (std::size_t place = 0; place < ports.size(); ++place) {
+    if (ports[place]->kind() != PortKind::read) continue;
+    const ShadowCapture::PortNote& note = capture_.present_note(place);
+    cells_[place]->put(capture_.present(place), note.status, note.time_ns);
+  }
+  clock_->set_now(instant_ns);
+  const WithoutRing none;
+  const auto held_before = PiMutex::held_by_this_thread();
+  const auto fault = [&](const char* what) {
+    PiMutex::let_go_of_all_but(held_before);
+    blend_->fault = std::string(what) + " in state " + TraceNames::word(machine_.state_name());
+  };
+  try {
+    if (machine_.due_ns() <= instant_ns) execute_wait_to_wait(instant_ns);
+  } catch (const std::exception& failure) {
+    fault(failure.what());
+  } catch (...) {
+    fault("an exception that is no std::exception");
+  }
+  for (std::size_t place = 0; place < ports.size(); ++place) {
+    if (ports[place]->kind() == PortKind::write) blend_->note_old(place, cells_[place]->take_written());
+  }
+  return clock_->spent_ns();
+}
+
+void Shadow::write_blended(time_ns_t instant_ns, time_ns_t now_ns) noexcept {
+  const double weight = blend_->weight(instant_ns);
+  if (!blend_->fault.empty()) return end_blend(ShadowCause::fault, instant_ns, now_ns);
+  if (weight >= 1.0 || !is_blending()) return end_blend(ShadowCause::promotion, instant_ns, now_ns);
+  blend_->write(weight);
+}
+
+void Shadow::end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) noexcept {
+  if (!is_holding_.exchange(false, std::memory_order_acq_rel)) return;
+  if (why == ShadowCause::live_fault) {
+    blend_->drop();
+  } else {
+    blend_->write(why == ShadowCause::stop ? blend_->weight(instant_ns) : 1.0);
+  }
+  blend_->end();
+  if (why == ShadowCause::live_fault || why == ShadowCause::stop)
+    awaits_outputs_.store(false, std::memory_order_release);
+  conclude(why, now_ns);
 }
 
 void Shadow::compare(const ShadowCapture::Release& release) {

@@ -34,6 +34,28 @@ void Task::start_shadow() noexcept {
   shadow_.use([](Shadow& shadow) { shadow.start(); });
 }
 
+bool Task::begin_blend(Shadow& shadow, std::unique_ptr<CoreBase>& old, time_ns_t instant_ns) noexcept {
+  const State* const wait = machine_.present_wait();
+  return wait != nullptr && shadow.begin_blend(old, wait->index, machine_.due_ns(), instant_ns);
+}
+
+/// A release is about to reach its next wait: the old core of a blend executes, and the outputs of both are written.
+void Task::blend_release() noexcept {
+  Shadow* blending = nullptr;
+  shadow_.use([&](Shadow& shadow) { blending = shadow.is_holding() ? &shadow : nullptr; });
+  if (blending == nullptr) return;
+  // Not within use(): who removes the component waits for no state of the old core. The shadow lives as long as the component has no other.
+  if (machine_.is_late()) return end_blend(ShadowCause::overrun);
+  machine_.clock().spend(blending->execute_old(machine_.clock_ns()));
+  const time_ns_t now_ns = machine_.look_at_clock();
+  if (machine_.is_late()) return end_blend(ShadowCause::overrun);
+  blending->write_blended(machine_.clock_ns(), now_ns);
+}
+
+void Task::end_blend(ShadowCause why) noexcept {
+  shadow_.use([&](Shadow& shadow) { shadow.end_blend(why, machine_.clock_ns(), clock().now_ns()); });
+}
+
 /// A release has reached its next wait.
 void Task::capture_release() noexcept {
   bool is_over = false;

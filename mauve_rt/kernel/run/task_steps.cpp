@@ -7,6 +7,7 @@
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/pi_mutex.hpp"
 #include "mauve_rt/base/seam/futex.hpp"
+#include "mauve_rt/run/shadow.hpp"
 #include "mauve_rt/run/task.hpp"
 
 namespace mauve {
@@ -109,6 +110,8 @@ void Task::run_to_next_wait() {
     if ((control & kStop) != 0) return end_run();
     if ((control & kGivenUp) != 0 && machine_.execution().has_timed_out()) [[unlikely]]
       return park_timed_out();
+    if (shadow_.is_set() && machine_.is_at_wait()) [[unlikely]]
+      blend_release();
     switch (machine_.enter_next()) {
       case Machine::Entered::execution:
         continue;
@@ -165,6 +168,7 @@ void Task::signal_awaited() noexcept {
 }
 
 void Task::end_run() noexcept {
+  end_blend(ShadowCause::stop);
   if (!ramps_down()) park_stopped();
 }
 
@@ -223,6 +227,7 @@ void Task::tell_over_declared() noexcept {
 }
 
 void Task::end_in_fault(bool has_taken_change) noexcept {
+  end_blend(ShadowCause::live_fault);
   const bool is_violation = note_fault_on_probation();
   const bool has_new_parts = settle_slot() || has_taken_change;
   if (machine_.execution().has_timed_out()) return park_timed_out(has_new_parts);  // in the take of new parts

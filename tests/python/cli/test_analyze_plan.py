@@ -87,6 +87,24 @@ def test_a_change_by_steps_with_its_handover(plan: Plan) -> None:
     assert after == now
 
 
+def test_a_blend_costs_the_time_of_both_cores(plan: Plan) -> None:
+    enforced = TIMED.replace("priority: 30,", "priority: 30, enforce_wcet: true,")
+    change = (
+        "- {kind: replace_core, target: low, name: executor_tests/Backwards, "
+        "value: {bumpless: {outputs: {count.data: 1e9}, blend_s: BLEND}}}\n"
+    )
+
+    def after(blend_s: str) -> dict[str, int]:
+        told = json.loads(plan(enforced, change.replace("BLEND", blend_s), "--json")[1])
+        found = told["changes"][0]["after"]["responses"]
+        return {name: one["response_ns"] for name, one in found.items()}
+
+    at_once, blended = after("0"), after("0.5")
+    assert blended["one"] == at_once["one"]
+    more_ns = blended["low"] - at_once["low"]
+    assert 1_000_000 <= more_ns < 1_100_000, "and what threads above it take in that time"
+
+
 def test_times_of_one_core_are_not_those_of_another(plan: Plan) -> None:
     status, out, _ = plan(TIMED, "- {kind: replace_core, target: one, name: executor_tests/HalfTimed}\n")
     assert status == 3

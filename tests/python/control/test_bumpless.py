@@ -1,5 +1,7 @@
 """A core that goes in only where its outputs are near, by requests; threads and virtual time."""
 
+import argparse
+import json
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +11,7 @@ from rebuilt_package import RebuiltPackage
 from reload_world import WORLDS, World, make_world_of_bad_cores
 
 from mauve_msgs.msg import StepReport
+from mauve_rt.cli.bumpless import add_bumpless, bumpless_text
 from mauve_rt.cli.views import report_lines
 from mauve_rt.control.requests import Code, Step
 from mauve_rt.interfaces.descriptions import component_infos, step_reports
@@ -49,6 +52,30 @@ def test_a_bumpless_change_says_how_far_each_output_stepped(world: World) -> Non
     assert list(report.taken) == ["sum", "rounds"]
     (line,) = report_lines([report])
     assert "sum.data" in line
+
+
+def test_a_blend_lasts_until_a_step_ends_it(world: World) -> None:
+    value = "{bumpless: {outputs: {sum.data: 1e9}, within_s: 60, blend_s: 60}}"
+    outcome = world.ask(_replace("Other", value))
+    assert outcome.success, outcome.message
+    assert world.part().core == "reload_tests/Other"
+    ended = "the candidate is the component's core now; the blend ended early: "
+    read = ReadShadow.of_message(_shadow_message(world), 0)
+    if read.verdict == "running":  # else a busy computer was late for a release
+        assert world.ask(Step("end_shadow", "loop")).success
+        read = ReadShadow.of_message(_shadow_message(world), 0)
+    assert read.verdict == "promoted"
+    assert read.reason in (f"{ended}a step end_shadow", f"{ended}an overrun of the component")
+    assert world.mean_step() == 1.0
+
+
+def test_a_core_in_python_does_not_go_over(world: World) -> None:
+    value = "{bumpless: {outputs: {sum.data: 1e9}, within_s: 60, blend_s: 1}}"
+    outcome = world.ask(_replace("PyLoop", value))
+    assert not outcome.success
+    assert "reload_tests/PyLoop in Python" in outcome.message
+    assert "leave out blend_s" in outcome.message
+    assert world.part().core == "reload_tests/Loop"
 
 
 def test_a_core_that_stays_far_is_refused_with_what_was_seen(world: World) -> None:
@@ -98,6 +125,9 @@ def test_probation_stands_beside_it(world: World) -> None:
         ("{outputs: {sum.data: 1}, within_s: 0}", "within_s: expected more than 0"),
         ("{outputs: {sum.data: 1}, within: 1}", "unknown key 'within'; did you mean"),
         ("{outputs: {sum.data: 1}, budget_us: no}", "budget_us: expected 0"),
+        ("{outputs: {sum.data: 1}, blend_s: 61}", "blend_s: expected 0 to 60 s, found 61"),
+        ("{outputs: {sum.data: 1}, blend_s: .nan}", "blend_s: expected 0 to 60 s, found nan"),
+        ("{blend_s: 1}", "1 to 100 outputs"),
         ("{outputs: {sum.date: 1}}", "no number there"),
         ("{outputs: {total.data: 1}}", "total"),
         ("3", "expected outputs and within_s, found '3'"),
@@ -109,6 +139,13 @@ def test_what_cannot_be_bounded_is_refused(value: str, words: str, world: World)
         assert not outcome.success
         assert words in outcome.message
     assert world.part().core == "reload_tests/Loop"
+
+
+def test_a_blend_stands_beside_no_probation(world: World) -> None:
+    value = "{probation_s: 60, bumpless: {outputs: {sum.data: 1e9}, blend_s: 1}}"
+    outcome = world.ask(_replace("Other", value))
+    assert not outcome.success
+    assert "expected one of blend_s and probation_s" in outcome.message
 
 
 def test_values_of_a_promotion_are_checked(world: World) -> None:
@@ -129,5 +166,14 @@ def test_defaults() -> None:
         ("a", "b.c", 1.0),
         ("d", "", 0.0),
     ]
-    assert (options.within_ns, options.budget_ns) == (2_000_000_000, 0)
+    assert (options.within_ns, options.budget_ns, options.blend_ns) == (2_000_000_000, 0, 0)
     assert not math.isnan(options.outputs[0].step)
+
+
+def test_the_command_line_writes_what_steps_have() -> None:
+    parser = argparse.ArgumentParser()
+    add_bumpless(parser)
+    plain = ["--bumpless", "sum.data=0.5", "--within", "3"]
+    assert bumpless_text(parser.parse_args(plain)) == '{"outputs": {"sum.data": 0.5}, "within_s": 3.0}'
+    blended = read_bumpless(json.loads(bumpless_text(parser.parse_args([*plain, "--blend", "0.25"]))))
+    assert blended.options().blend_ns == 250_000_000

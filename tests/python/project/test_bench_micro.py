@@ -78,14 +78,14 @@ def test_a_lookup_has_a_limit_for_each_hop(monkeypatch: pytest.MonkeyPatch):
 def test_a_shadow_costs_what_it_adds(monkeypatch: pytest.MonkeyPatch):
     calls = {"read": 2, "write": 10, "tapped_read": 14, "tapped_write": 20, "watched_write": 21}
     calls |= {"limited_write": 30, "capture": 7}
-    times_us = {"plain": 8, "shadowed": 11, "awaiting": 10, "waking": 12, "probation": 9}
+    times_us = {"plain": 8, "shadowed": 11, "awaiting": 10, "waking": 12, "probation": 9, "blended": 10}
     times_us |= {"neighbour_plain": 5, "neighbour_awaiting": 6, "blackout": 20, "bumpless_blackout": 30}
     found = {f"{name}_ps": [1000 * each] for name, each in calls.items()}
     found |= {f"{name}_ns": [1000 * each] for name, each in times_us.items()}
     _with(monkeypatch, found | {"releases": 60, "compared": 59}, {0})
     rows = list(micro.shadow_rows(QUICK))
     assert [row.ratio for row in rows] == [
-        *(7, 2, 2.1, 3, None, None, 11 / 8, 10 / 8, 12 / 8, 9 / 8),
+        *(7, 2, 2.1, 3, None, None, 11 / 8, 10 / 8, 12 / 8, 9 / 8, 10 / 8),
         *(6 / 5, 30 / 20) * 2,
     ]
     (added,) = [row for row in rows if row.target != "-"]

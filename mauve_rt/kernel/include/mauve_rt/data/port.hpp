@@ -267,7 +267,7 @@ class WritePort final : public PortBase {
       detail::clear_sequences(*borrowed.place);
       std::forward<Fill>(fill)(*borrowed.place);
       if (is_special()) [[unlikely]] {
-        if (is_closed()) return true;
+        if (is_closed() || is_held_back(borrowed.place)) return true;
         if (is_tapped()) tell_write(borrowed.place);
         if (!admits(borrowed.place)) return true;
         if (slew_limit() != nullptr) return publish_limited(borrowed);
@@ -280,6 +280,9 @@ class WritePort final : public PortBase {
   }
   /// A value with memory for the sequences of whatever the connected resource takes: for members that are written. [setup]
   T prototype() const { return std::move(*make()); }
+  void write_held(const void* value) noexcept override {
+    if (!is_closed() && !is_previewed()) write_now(*static_cast<const T*>(value));
+  }
   using PortBase::write_zero;
   void write_zero(time_ns_t time_ns) noexcept override {
     if (service_ == nullptr) return;
@@ -356,7 +359,10 @@ class WritePort final : public PortBase {
   }
   // Out of line, as ReadPort::read_specially().
   [[gnu::noinline, gnu::cold]] bool write_specially(const T& value) noexcept {
-    if (is_closed() || is_previewed()) return true;
+    if (is_closed() || is_previewed() || is_held_back(&value)) return true;
+    return write_now(value);
+  }
+  bool write_now(const T& value) noexcept {
     if (is_tapped()) tell_write(&value);
     if (service_ == nullptr || !admits(&value)) return true;
     const bool taken = slew_limit() != nullptr ? put_limited(value, stamp_ns()) : put(value, stamp_ns());

@@ -58,7 +58,7 @@ struct ConnectedTo {
 ///
 /// special_ says whether a read or a write may be anything but a look at the service: one load tells. Its bits: closed or left
 /// behind, by the watchdog and who removes the component; watched and tapped, with watch_ and tap_; previewed, with stand_ins_;
-/// limited, with slew_limit_.
+/// limited, with slew_limit_; held, with hold_.
 ///
 /// | member      | written by                     | read by                   | order                                |
 /// | ----------- | ------------------------------ | ------------------------- | ------------------------------------ |
@@ -73,6 +73,7 @@ struct ConnectedTo {
 /// | stand_ins_  | preview(), end_preview()       | the thread that previews  | each its own: base/previews.hpp; its bit: shown_mutex_ |
 /// | watch_      | the component's thread; who ends the watch | component            | its own: revocable_reference.hpp     |
 /// | tap_        | the component's thread; who ends the tap | component              | its own: revocable_reference.hpp     |
+/// | hold_       | the component's thread; who ends the hold | component             | its own: revocable_reference.hpp     |
 class PortBase {
  public:
   PortBase(std::string name, PortKind kind, std::string type)
@@ -177,6 +178,16 @@ class PortBase {
   }
   /// No thread uses this tap any more afterwards. [rt] As unwatch().
   void untap(const PortTap& tap) MAUVE_RT { tap_.revoke(tap, kForever); }
+  /// Passes each value to the hold in place of writing it, until unhold(); what write_zero() and write_stopped() write is not held.
+  /// [rt], on the component's thread, or parked.
+  void hold(PortTap& hold) MAUVE_RT {
+    hold_.set(hold);
+    set_special(kHeld, kHeld);
+  }
+  /// [rt] As unwatch().
+  void unhold(const PortTap& hold) MAUVE_RT { hold_.revoke(hold, kForever); }
+  /// Writes a value of its type as write() does, held or not. [rt], on the component's thread
+  virtual void write_held(const void* /*value*/) MAUVE_RT {}
   /// Numbers of what it writes move no faster than this output says, from the last value that was written for the output.
   /// [setup] Throws Error (invalid_argument): no write port, no number there, values that cannot be copied in real time.
   void limit_slew(std::shared_ptr<SlewedOutput> output);
@@ -249,6 +260,12 @@ class PortBase {
   [[gnu::noinline, gnu::cold]] void tell_write(const void* value) MAUVE_RT {
     tap_.use([&](PortTap& tap) MAUVE_RT { tap.on_write(value); });
   }
+  /// Whether the value is held, and not to be written. [rt], on the component's thread.
+  bool is_held_back(const void* value) MAUVE_RT {
+    if (!is_still(hold_, kHeld)) return false;
+    hold_.use([&](PortTap& hold) MAUVE_RT { hold.on_write(value); });
+    return true;
+  }
   /// Whether any of the others here may say something. [rt]
   bool is_special() const MAUVE_RT { return special_.load(std::memory_order_acquire) != 0; }
   bool is_closed() const MAUVE_RT { return has(kClosed | kLeft); }
@@ -257,7 +274,7 @@ class PortBase {
 
  private:
   static constexpr std::uint32_t kClosed = 1, kLeft = 2, kWatched = 4, kTapped = 8, kPreviewed = 16,
-                                 kLimited = 32;
+                                 kLimited = 32, kHeld = 64;
 
   bool has(std::uint32_t bits) const noexcept {
     return (special_.load(std::memory_order_acquire) & bits) != 0;
@@ -299,6 +316,7 @@ class PortBase {
   bool is_seated_{false};  // has its seat at connection_.service
   RevocableReference<OutputWatch> watch_;
   RevocableReference<PortTap> tap_;
+  RevocableReference<PortTap> hold_;
   std::unique_ptr<SlewLimit> slew_limit_;
   Previews<std::unique_ptr<PortBase>> stand_ins_;
 };

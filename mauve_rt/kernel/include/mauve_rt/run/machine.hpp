@@ -160,6 +160,12 @@ class Machine {
   bool end_execution() MAUVE_RT { return execution_.end(); }
   /// It is about to park, and nothing is under way any more; false when it timed out before. [rt]
   bool leave() MAUVE_RT { return execution_.leave(); }
+  /// Whether a wait is to be entered next. [rt]
+  bool is_at_wait() const MAUVE_RT { return next_ != nullptr && next_->is_wait; }
+  /// Whether that would be an overrun. [rt]
+  bool is_late() const MAUVE_RT {
+    return is_at_wait() && next_->event == nullptr && boundary_ns_ > later_by(clock_ns(), next_->duration_ns);
+  }
   /// Reads the clock for what follows. [rt]
   time_ns_t look_at_clock() MAUVE_RT { return boundary_ns_ = clock_->now_ns(); }
   /// Instants that passed since then are skipped whatever the overrun policy; returns how many. One that has passed by less

@@ -19,6 +19,7 @@
 #include "mauve_rt/parts/fsm.hpp"
 #include "mauve_rt/parts/handover.hpp"
 #include "mauve_rt/parts/property.hpp"
+#include "mauve_rt/run/blend.hpp"
 #include "mauve_rt/run/machine.hpp"
 #include "mauve_rt/run/output_comparison.hpp"
 #include "mauve_rt/run/output_steps.hpp"
@@ -52,12 +53,15 @@ const char* to_string(ShadowVerdict verdict) MAUVE_RT;
 enum class ShadowCause : std::uint8_t {
   none,
   fault,
-  request,    // a step end_shadow
-  changed,    // the component's parts or wiring were changed
-  closed,     // the component was cleaned up or removed, or its host was shut down
-  promotion,  // a step promote
-  lost,       // a step promote was refused, and the candidate was cleaned up with it
-  hung,       // a state of the candidate did not end
+  request,     // a step end_shadow
+  changed,     // the component's parts or wiring were changed
+  closed,      // the component was cleaned up or removed, or its host was shut down
+  promotion,   // a step promote
+  lost,        // a step promote was refused, and the candidate was cleaned up with it
+  hung,        // a state of the candidate did not end
+  overrun,     // of the component, in a blend
+  stop,        // of the component, in a blend
+  live_fault,  // of the new core, in a blend
 };
 
 /// One shadow as anyone may see it.
@@ -102,6 +106,10 @@ struct ShadowParts {
 /// the component is cleaned up or removed, and at the host's shutdown. A stop of the component pauses it. Properties that are set
 /// while it runs are set in the candidate's shell, too, soon after.
 ///
+/// After a bumpless change with a blend (blend.hpp) it has the parts the other way round: the old core is in the shadow's shell, and
+/// executes on the component's thread, at the end of each release, on the inputs that the new core has read in that very release. The
+/// blend ends by its time, by an overrun of the component, a fault of either core, a stop, and by all that ends a shadow.
+///
 /// | member            | written by                                  | read by                | order                                |
 /// | ----------------- | ------------------------------------------- | ---------------------- | ------------------------------------ |
 /// | phase_            | who takes it; then who ends it first, by CAS | anyone                | acq_rel: hands over what it wrote before |
@@ -119,6 +127,8 @@ struct ShadowParts {
 /// | follows_          | who makes it wait for near outputs          | the component's thread | relaxed: a lone flag                 |
 /// | awaits_outputs_   | the component's thread, who closes it       | anyone                 | release/acquire: the steps           |
 /// | measures_outputs_ | the component's thread, who closes or detaches it | anyone           | release/acquire: the curves          |
+/// | blend_            | who makes it wait for near outputs          | the component's thread, who retires it | figures_mutex_, run_mutex_; the commit publishes it |
+/// | has_blended_, is_holding_ | the component's thread; who detaches | same, who tells of it | acq_rel: one of them ends the hold   |
 /// | executing_since_ns_ | who executes                              | who settles            | relaxed: a lone number; 0: nothing executes |
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
@@ -156,6 +166,7 @@ class Shadow {
   void detach() MAUVE_RT {
     end_measurement();
     capture_.detach();
+    if (is_holding_.exchange(false, std::memory_order_acq_rel)) blend_->end();
   }
   bool has_ended() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kEnded; }
 
@@ -171,6 +182,28 @@ class Shadow {
   void note_swap(time_ns_t instant_ns) MAUVE_RT {
     if (measures_outputs()) steps_->note_swap(instant_ns);
   }
+
+  // ---- a blend, by the component's thread
+
+  /// Whether the outputs are to go over from those of this core. [rt]
+  bool may_blend(const CoreBase& live) const MAUVE_RT {
+    return blend_ != nullptr && blend_->binding.core == &live &&
+           phase_.load(std::memory_order_acquire) == kRunning;
+  }
+  /// The old core goes on here, from that wait of this index, which ends at `due_ns`; w is 0 at the instant. False: the shadow has
+  /// ended, and the core is still the caller's. [rt] as far as the core's bind_shell() is
+  bool begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_ns_t due_ns,
+                   time_ns_t instant_ns) noexcept;
+  /// Whether outputs are held. [rt]
+  bool is_holding() const MAUVE_RT { return is_holding_.load(std::memory_order_acquire); }
+  /// Before the wait that ends a release: executes the old core, and returns the time that its states declare in virtual time. [rt] as
+  /// far as the states are
+  time_ns_t execute_old(time_ns_t instant_ns) noexcept;
+  /// Writes the outputs of this release; the last time, those of the new core. [rt]
+  void write_blended(time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
+  /// Before its time. The outputs that are held are written: at a stop as they would be at the end of the release, after a fault of the
+  /// new core not at all, else those of the new core. [rt]
+  void end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
 
   /// Ends it when a release of the candidate executes for longer than this. [non-rt]
   void conclude_if_hung(time_ns_t longest_ns) noexcept;
@@ -200,8 +233,9 @@ class Shadow {
   /// What the candidate takes over from the live core as it begins; nullptr: nothing. [non-rt], after prepare()
   const Handover* handover() const noexcept { return handover_.get(); }
   /// From now on the task is woken when the listed outputs are near. Unless the candidate is fresh it begins each release with the state
-  /// fields that the live core had before it. [non-rt] Throws Error as suspend(), and as OutputSteps.
-  void await_near(const std::vector<GreatestStep>& outputs, bool is_fresh, Component& component);
+  /// fields that the live core had before it. [non-rt] Throws Error as suspend(), and as OutputSteps; type_mismatch: one of both cores has
+  /// no blend.
+  void await_near(const BumplessOptions& options, bool is_fresh, Component& component);
   /// The reverse. [non-rt]
   void end_await() noexcept {
     awaiting_.revoke(kForever);
@@ -216,7 +250,7 @@ class Shadow {
   const std::string& core_name() const noexcept { return core_; }
 
  private:
-  enum Phase : std::uint32_t { kPrepared, kRunning, kEnding, kEnded };
+  enum Phase : std::uint32_t { kPrepared, kRunning, kBlending, kEnding, kEnded };
   /// Time that stands still while the candidate executes.
   class StillClock;
   struct Figures {
@@ -239,11 +273,15 @@ class Shadow {
   void take_properties();
   void put_inputs();
   bool advance_to(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
+  bool is_blending() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kBlending; }
   void compare(const ShadowCapture::Release& release) MAUVE_REQUIRES(figures_mutex_);
   void count_execution(time_ns_t execution_ns) MAUVE_REQUIRES(run_mutex_, figures_mutex_);
   void fault(const std::string& what, time_ns_t instant_ns);
+  void execute_wait_to_wait(time_ns_t instant_ns);
+  std::unique_ptr<Blend> make_blend(time_ns_t duration_ns, Component& component);
   void clean_up() noexcept;
   std::string reason() const MAUVE_REQUIRES(figures_mutex_);
+  std::string words_of_cause() const MAUVE_REQUIRES(figures_mutex_);
 
   const std::string component_;
   const std::string live_core_;
@@ -261,6 +299,9 @@ class Shadow {
   Atomic<bool> measures_outputs_{false};
   Atomic<std::uint64_t> skipped_budget_{0};
   Atomic<bool> follows_{false};
+  std::unique_ptr<Blend> blend_{};
+  Atomic<bool> has_blended_{false};
+  Atomic<bool> is_holding_{false};
 
   Atomic<std::uint32_t> phase_{kPrepared};
   Atomic<time_ns_t> executing_since_ns_{0};

@@ -82,6 +82,8 @@ class ShadowCapture {
   const std::byte* present(std::size_t port) const MAUVE_RT;
   /// Whether it was read or written since the last release ended. [rt]
   bool is_noted(std::size_t port) const MAUVE_RT { return present_.notes[port].is_noted; }
+  /// How the port was read last, by its place in the shell. [rt]
+  const PortNote& present_note(std::size_t port) const MAUVE_RT { return present_.notes[port]; }
   /// The release that ends is for no candidate. [rt]
   void forget_release() MAUVE_RT;
 

@@ -181,6 +181,9 @@ class Task final : public Waiter {
   void set_shadow(Shadow& shadow) MAUVE_RT;
   /// The component's parts or wiring change, which ends its shadow. [rt], in a take.
   void end_shadow(ShadowCause why) MAUVE_RT;
+  /// The outputs go over from those of this core, which has just been replaced. False: they do not, and it is still the caller's. [rt]
+  /// as far as the core's bind_shell() is, in a take.
+  bool begin_blend(Shadow& shadow, std::unique_ptr<CoreBase>& old, time_ns_t instant_ns) noexcept;
   /// No thread uses the shadow any more afterwards; the component may have another by now. [non-rt], the component claimed.
   void forget_shadow(const Shadow& shadow) noexcept { shadow_.revoke(shadow, kForever); }
 
@@ -463,6 +466,8 @@ class Task final : public Waiter {
   void start_shadow() noexcept;
   void leave_shadow() noexcept;
   void capture_release() noexcept;
+  void blend_release() noexcept;
+  void end_blend(ShadowCause why) noexcept;
   void take_up_revert() noexcept;
   void revert_in_park() noexcept;
   void put_back_in_wait(Probation& probation) noexcept;
