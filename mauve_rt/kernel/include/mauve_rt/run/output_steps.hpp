@@ -27,8 +27,8 @@ struct GreatestStep {
 struct BumplessOptions {
   std::vector<GreatestStep> outputs{};  // at least one
   time_ns_t within_ns{s_to_ns(2)};      // so long such an instant is waited for; 1 to kLongest
-  time_ns_t budget_ns{0};               // of the candidate, as ShadowOptions::budget_ns; 0: the component's period
-  time_ns_t blend_ns{0};  // so long the outputs go over (blend.hpp); 0: at once; at most Blend::kLongest
+  time_ns_t budget_ns{0};  // of the candidate, as ShadowOptions::budget_ns; 0: the component's period
+  time_ns_t blend_ns{0};   // so long the outputs go over (blend.hpp); 0: at once; at most Blend::kLongest
 };
 /// Throws Error (invalid_argument): a time or a step makes no sense, whatever the component's ports are. [non-rt]
 void check_options(const BumplessOptions& options, const std::string& component);
