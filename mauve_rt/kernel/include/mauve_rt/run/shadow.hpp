@@ -211,8 +211,11 @@ class Shadow {
   bool awaits_outputs() const MAUVE_RT { return awaits_outputs_.load(std::memory_order_acquire); }
   /// It was promoted, and the curves of the listed outputs go on: OutputSteps::kCurve releases. [rt], any thread
   bool measures_outputs() const MAUVE_RT { return measures_outputs_.load(std::memory_order_acquire); }
-  /// It has ended, and the component's ports still refer to it. [rt], any thread
-  bool is_to_settle() const MAUVE_RT { return has_ended() && capture_.is_attached() && !measures_outputs(); }
+  /// It has ended, and the component's ports still refer to it, or no thread of its own retires it. [rt], any thread
+  bool is_to_settle() const MAUVE_RT {
+    const bool is_to_retire = signal_ == nullptr && !is_settled_.load(std::memory_order_relaxed);
+    return has_ended() && !measures_outputs() && (capture_.is_attached() || is_to_retire);
+  }
 
   // ---- who executes: the shadow's thread, or a simulation
 
