@@ -223,6 +223,7 @@ class FakeRobot:
             release_ns=pending_ns,
             taken=[],
             left=[],
+            outputs=[],
         )
         event = self.messages.cdr(
             "mauve_msgs/msg/ReconfigurationEvent",

@@ -20,6 +20,7 @@ TABLES = {
     "decisions",
     "deployments",
     "marks",
+    "output_curves",
     "overruns",
     "reconfigurations",
     "records",

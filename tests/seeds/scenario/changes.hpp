@@ -186,13 +186,14 @@ class Changes : protected Checks {
     part.input = written_by(target);
   }
 
-  /// Gives a component a shadow; of one that has a shadow promotes or ends it.
+  /// Gives a component a shadow; of one that has a shadow promotes or ends it. The candidate keeps its own count, which the history
+  /// follows.
   void enter_shadow(Draft& draft, std::size_t index, Dice& dice) {
     Part& part = draft.after[index];
     for (const ShadowRecord& shadow : deployer_->shadows()) {
       if (shadow.component != part.name || shadow.verdict != ShadowVerdict::running) continue;
       if (dice.once_in(2)) {
-        draft.transaction.promote(part.name);
+        draft.transaction.promote(part.name, {.is_fresh = true});
         part.core = core_of(shadow.core);
         draft.text += " promote " + part.name;
       } else {
@@ -206,7 +207,7 @@ class Changes : protected Checks {
     const int number = next_core_++;
     draft.text += " shadow " + std::to_string(number) + " (" + manner.name() + ") " + part.name;
     draft.transaction.shadow(part.name, core(number, static_cast<int>(index), manner),
-                             {.budget_ns = ms_to_ns(1)}, std::make_unique<TestShell>());
+                             {.budget_ns = ms_to_ns(1), .is_fresh = true}, std::make_unique<TestShell>());
   }
 
   /// New parts of one component: a core, on probation or not, an fsm with the same period or another one, a shell.
