@@ -127,8 +127,9 @@ void Draft::check_bumpless(const DraftComponent& component) const {
                  .remedy = remedy,
                  .step = component.core_step});
   };
+  const BumplessOptions options = component.bumpless.value_or(BumplessOptions{});
   try {
-    check_options(*component.bumpless, component.name());
+    check_options(options, component.name());
   } catch (const Error& failure) {
     rethrow_as_of(failure, component.name(), component.core_step);
   }
@@ -143,7 +144,7 @@ void Draft::check_bumpless(const DraftComponent& component) const {
            "a bumpless change replaces the core of its component, and nothing else",
            "no new shell or fsm, no wiring, property or configure step of the component",
            "make these changes in a transaction before");
-  if (component.bumpless->blend_ns != 0 && component.probation)
+  if (options.blend_ns != 0 && component.probation)
     refuse(ErrorCode::invalid_argument,
            "a core on probation goes in at once: the old core must stay as it is",
            "one of blend_s and probation_s", "leave out one of both");

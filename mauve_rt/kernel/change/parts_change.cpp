@@ -174,7 +174,7 @@ bool PartsChange::is_ready(bool is_last) noexcept {
     component_.task_.set_shadow(*candidate_);
     return false;
   }
-  if (is_last && candidate_->is_near()) parts_.core = candidate_->hand_over();
+  if (is_last && candidate_->is_near()) candidate_->hand_over(parts_.core);
   return parts_.core != nullptr;
 }
 

@@ -305,7 +305,7 @@ void TransactionCommit::Work::note_fields(int step, const Handover* handover) {
 /// Of a bumpless change: it executes in the shadow from the first wait of the component on, unless it does already.
 std::shared_ptr<Shadow> TransactionCommit::Work::prepare_candidate(DraftComponent& changed) {
   Component& component = *changed.component;
-  const BumplessOptions& options = *changed.bumpless;
+  const BumplessOptions options = changed.bumpless.value_or(BumplessOptions{});
   std::shared_ptr<Shadow> candidate = changed.promoted;
   if (candidate == nullptr) {
     require_no_shadow(*draft_, changed);

@@ -279,7 +279,7 @@ void TransactionCommit::Work::gather() {
     place->replaces_parts = change.parts != nullptr;
     if (change.parts != nullptr && change.draft->restarts) change.parts->give_up_place();
     if (change.parts != nullptr && change.parts->candidate() != nullptr) {
-      commit->set_last(*place, change.draft->bumpless->within_ns,
+      commit->set_last(*place, change.draft->bumpless.value_or(BumplessOptions{}).within_ns,
                        [host = host_](time_ns_t until_ns) { return host->pass_time(until_ns); });
       swapped_ = {.candidate = change.parts->candidate(), .step = change.draft->core_step};
     }
@@ -446,7 +446,7 @@ void TransactionCommit::Work::throw_if_not_near(const Change& change) const {
   const ShadowRecord record = change.parts->candidate()->record();
   const bool has_ended = commit_->refused_by() == change.parts.get() && record.end_ns != 0;
   if (!is_over && !has_ended) return;
-  const auto& bumpless = *change.draft->bumpless;
+  const BumplessOptions bumpless = change.draft->bumpless.value_or(BumplessOptions{});
   ErrorDetail detail{.component = change.draft->name(),
                      .element = "bumpless",
                      .expected = {},

@@ -207,12 +207,11 @@ bool Shadow::measure_steps(time_ns_t instant_ns) noexcept {
   return steps_->is_complete();
 }
 
-std::unique_ptr<CoreBase> Shadow::hand_over() noexcept {
-  if (!MAUVE_RT_TRUSTED(run_mutex_.try_lock())) return nullptr;  // it waits for no thread
-  std::unique_ptr<CoreBase> core;
-  if (phase_.load(std::memory_order_acquire) < kEnding) core = std::move(parts_.core);
+void Shadow::hand_over(std::unique_ptr<CoreBase>& to) noexcept {
+  MAUVE_EXPECTS(to == nullptr);
+  if (!MAUVE_RT_TRUSTED(run_mutex_.try_lock())) return;  // it waits for no thread
+  if (phase_.load(std::memory_order_acquire) < kEnding) MAUVE_RT_TRUSTED(to.swap(parts_.core));
   MAUVE_RT_TRUSTED(run_mutex_.unlock());
-  return core;
 }
 
 void Shadow::conclude_if_hung(time_ns_t longest_ns) noexcept {

@@ -401,7 +401,7 @@ def _reconfigure(ros: Any) -> Request:
 
 
 def _reload(ros: Any) -> Request:
-    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back, probation=_replacement_value(ros))
+    order = ReloadOrder(targets=tuple(ros.targets), back=ros.back, probation=_probation_value(ros))
     return Request(reload=order, dry_run=ros.dry_run, **_commit(ros), **_common(ros))
 
 
@@ -432,14 +432,24 @@ def _write_snapshot(ros: Any) -> Request:
 
 def _replacement_value(ros: Any) -> str:
     """The value of a step replace_core; empty: at once, and without probation."""
-    keys = []
-    if ros.probation_s != 0.0 or ros.revert_on:
-        keys.append(f"probation_s: {ros.probation_s!r}")
-        keys.append(f"revert_on: [{', '.join(ros.revert_on)}]")
-        keys.append(f"releases: {ros.probation_releases}")
-    if ros.bumpless:
-        keys.append(f"bumpless: {ros.bumpless}")
+    keys = _probation_keys(ros) + [f"bumpless: {ros.bumpless}"] * bool(ros.bumpless)
     return f"{{{', '.join(keys)}}}" if keys else ""
+
+
+def _probation_value(ros: Any) -> str:
+    """What a reload says of a probation, as the value of a step; empty: there is none."""
+    keys = _probation_keys(ros)
+    return f"{{{', '.join(keys)}}}" if keys else ""
+
+
+def _probation_keys(ros: Any) -> list[str]:
+    if ros.probation_s == 0.0 and not ros.revert_on:
+        return []
+    return [
+        f"probation_s: {ros.probation_s!r}",
+        f"revert_on: [{', '.join(ros.revert_on)}]",
+        f"releases: {ros.probation_releases}",
+    ]
 
 
 def _commit(ros: Any) -> dict[str, Any]:

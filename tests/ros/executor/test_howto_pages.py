@@ -110,7 +110,7 @@ def test_a_component_is_removed_and_added_as_the_page_says(
     before = page.part("guidance")
     said = page.run("mauve reconfigure")
     assert "would be accepted" in said, said
-    assert "8 steps are in force" in said, said
+    assert "10 steps are in force" in said, said
     after = page.part("guidance")
     assert after.state == ComponentInfo.RUNNING
     kept = ("core", "priority", "cpus", "period_ns")

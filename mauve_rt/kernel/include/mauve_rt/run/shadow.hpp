@@ -158,8 +158,9 @@ class Shadow {
   bool has_begun() const MAUVE_RT { return phase_.load(std::memory_order_acquire) != kPrepared; }
   /// The component starts in its initial state. [rt]
   void start() MAUVE_RT;
-  /// A release of this core has reached its next wait. Whether it is the last that is looked at. [rt] as begin()
-  bool end_release(time_ns_t instant_ns, const State* next_wait, const CoreBase* live) MAUVE_RT;
+  /// A release of this core has reached its next wait. Whether it is the last that is looked at. [rt] as far as the cores' state fields
+  /// are.
+  bool end_release(time_ns_t instant_ns, const State* next_wait, const CoreBase* live) noexcept;
   /// Ends it; does nothing when it has ended before. [rt], any thread
   void conclude(ShadowCause why, time_ns_t now_ns) MAUVE_RT;
   /// Captures no more: the component's ports refer to it no longer. [rt], or an ordinary thread that has claimed the component
@@ -174,8 +175,9 @@ class Shadow {
 
   /// Whether each listed output was near in the component's last release. [rt], the component's thread
   bool is_near() const MAUVE_RT { return near_.load(std::memory_order_acquire) == capture_.captured(); }
-  /// The candidate's core, which executes no more here; nullptr: the shadow's thread looks at it this moment, or it has ended. [rt]
-  std::unique_ptr<CoreBase> hand_over() MAUVE_RT;
+  /// Gives away the candidate's core, which executes no more here; nothing: the shadow's thread looks at it this moment, or it has
+  /// ended. [rt]
+  void hand_over(std::unique_ptr<CoreBase>& to) MAUVE_RT;
   /// It was promoted: measures the first values of each listed output. Whether there is one to measure. [rt], the component's thread
   bool await_outputs() MAUVE_RT;
   /// The component runs with the promoted core from this instant on. [rt], the component's thread

@@ -177,8 +177,8 @@ class Task final : public Waiter {
 
   // ---- a shadow of the component (shadow.hpp)
 
-  /// The releases from now on are captured for the shadow. [rt], in a take.
-  void set_shadow(Shadow& shadow) MAUVE_RT;
+  /// The releases from now on are captured for the shadow. [rt] as far as the cores' state fields are, in a take.
+  void set_shadow(Shadow& shadow) noexcept;
   /// The component's parts or wiring change, which ends its shadow. [rt], in a take.
   void end_shadow(ShadowCause why) MAUVE_RT;
   /// The outputs go over from those of this core, which has just been replaced. False: they do not, and it is still the caller's. [rt]
