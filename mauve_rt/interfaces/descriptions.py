@@ -38,7 +38,6 @@ from mauve_rt._kernel import (
     ShadowRecord,
     SlewRecord,
 )
-from mauve_rt._kernel import OutputCurve as OutputCurveRecord
 from mauve_rt.control.checks import MAX_TEXT
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.control.runtime import Observed, Runtime
@@ -111,7 +110,14 @@ def component_info(
 
 def slew_limit(record: SlewRecord) -> Any:
     """SlewLimit of a number of an output."""
-    return SlewLimit(**{name: getattr(record, name) for name in SlewLimit.get_fields_and_field_types()})
+    return _as_message(SlewLimit, record)
+
+
+def _as_message(message_class: Any, record: object) -> Any:
+    """A message whose fields the record has by the same names."""
+    return message_class(
+        **{name: getattr(record, name) for name in message_class.get_fields_and_field_types()}
+    )
 
 
 def _authored(authors: Mapping[str, str]) -> list[str]:
@@ -119,7 +125,7 @@ def _authored(authors: Mapping[str, str]) -> list[str]:
 
 
 def _state_info(state: DescribedState, times: Mapping[str, int | None]) -> Any:
-    info = StateInfo(**{name: getattr(state, name) for name in StateInfo.get_fields_and_field_types()})
+    info = _as_message(StateInfo, state)
     if state.name in times:
         info.wcet_ns = times[state.name] or 0
     return info
@@ -334,32 +340,13 @@ def shadow_message(record: ShadowRecord, *, curves: bool = False) -> Any:
             for number in output.numbers
         ],
         steps=[output_step(step) for step in record.steps],
-        curves=[_output_curve(curve) for curve in record.curves] if curves else [],
-    )
-
-
-def _output_curve(curve: OutputCurveRecord) -> Any:
-    return OutputCurve(
-        output=curve.output,
-        instant_ns=curve.instant_ns,
-        instants_ns=curve.instants_ns,
-        live=curve.live,
-        candidate=curve.candidate,
-        new_instants_ns=curve.new_instants_ns,
-        new_core=curve.new_core,
+        curves=[_as_message(OutputCurve, curve) for curve in record.curves] if curves else [],
     )
 
 
 def output_step(step: OutputStep) -> Any:
     """OutputStep of one output of a bumpless change."""
-    return OutputStepMessage(
-        output=step.output,
-        greatest=step.greatest,
-        difference=step.difference,
-        least=step.least,
-        least_instant_ns=step.least_instant_ns,
-        step=step.step,
-    )
+    return _as_message(OutputStepMessage, step)
 
 
 def step_reports(outcome: Outcome) -> list[Any]:

@@ -59,12 +59,10 @@ class RecordedShadows:
                 found[name] = ended = copy(message)
                 ended.verdict, ended.end_ns, ended.reason = Shadow.ENDED, now_ns, "the component was removed"
         self._seen = found
-        all_now = {name: _Recorded(one, self._serialize(one), now_ns) for name, one in found.items()}
-        due = {name: one for name, one in all_now.items() if self._is_due(name, one)}
-        self._recorded |= due
-        return [
-            SentMessage(self._topic, "mauve_msgs/msg/Shadow", one.data, now_ns, None) for one in due.values()
+        due = [
+            one for name, message in found.items() if (one := self._due(name, message, now_ns)) is not None
         ]
+        return [SentMessage(self._topic, "mauve_msgs/msg/Shadow", data, now_ns, None) for data in due]
 
     def dropped_messages(self) -> int:
         """None: they are made when they are taken."""
@@ -74,15 +72,20 @@ class RecordedShadows:
         """By component."""
         return {record.component: shadow_message(record, curves=True) for record in self._runtime.shadows()}
 
-    def _is_due(self, component: str, one: _Recorded) -> bool:
+    def _due(self, component: str, message: Any, now_ns: int) -> bytes | None:
+        """What is to be recorded now; None: nothing."""
         before = self._recorded.get(component)
-        if before is None:
-            return True
-        now, then = one.message, before.message
-        goes_on = (now.begin_ns, now.verdict) == (then.begin_ns, then.verdict) and not self._is_finishing
-        is_running = now.verdict == Shadow.RUNNING
+        is_same = before is not None and (message.begin_ns, message.verdict) == (
+            before.message.begin_ns,
+            before.message.verdict,
+        )
+        goes_on = is_same and not self._is_finishing
+        is_running = message.verdict == Shadow.RUNNING
         period_ns = _PERIOD_NS if is_running else _PERIOD_AFTER_END_NS
-        if goes_on and (is_running or one.time_ns < before.time_ns + period_ns):
-            return one.time_ns >= before.time_ns + period_ns
+        if before is not None and goes_on and now_ns < before.time_ns + period_ns:
+            return None
+        data = self._serialize(message)
+        self._recorded[component] = _Recorded(message, data, now_ns)
         # After the end its thread may complete a release, and the curves go on. As bytes: NaN equals NaN.
-        return one.data != before.data
+        is_new = before is None or (goes_on and is_running) or data != before.data
+        return data if is_new else None

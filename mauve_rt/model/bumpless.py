@@ -4,12 +4,12 @@
  value: {bumpless: {outputs: {command.torque: 0.5}, within_s: 2, blend_s: 0.5}}}
 """
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from mauve_rt._kernel import BumplessOptions, GreatestStep
 from mauve_rt.file_schema.words import did_you_mean, shown
+from mauve_rt.model.probation import is_number
 
 MAX_WITHIN_S = 3_600.0
 MAX_OUTPUTS = 100
@@ -58,20 +58,17 @@ def read_bumpless(value: object) -> Bumpless:
             f"bumpless: outputs: expected {{PORT.FIELD: greatest step}}, 1 to {MAX_OUTPUTS} outputs"
         )
     for output, step in outputs.items():
-        if not isinstance(output, str) or not _is_number(step) or step < 0:
+        if not isinstance(output, str) or not is_number(step) or step < 0:
             raise ValueError(
                 f"bumpless: outputs: {shown(str(output))}: expected a greatest step >= 0, found {step}"
             )
-    within, budget = value.get("within_s", 2.0), value.get("budget_us", 0.0)
-    if not _is_number(within) or not 0 < within <= MAX_WITHIN_S:
+    within = value.get("within_s", Bumpless.within_s)
+    if not is_number(within) or not 0 < within <= MAX_WITHIN_S:
         raise ValueError(f"bumpless: within_s: expected more than 0 to {MAX_WITHIN_S:g} s, found {within}")
-    if not _is_number(budget) or not 0 <= budget <= MAX_BUDGET_US:
-        raise ValueError(f"bumpless: budget_us: expected 0 to {MAX_BUDGET_US:g} us, found {budget}")
-    blend = value.get("blend_s", 0.0)
-    if not _is_number(blend) or not 0 <= blend <= MAX_BLEND_S:
-        raise ValueError(f"bumpless: blend_s: expected 0 to {MAX_BLEND_S:g} s, found {blend}")
-    return Bumpless(outputs=outputs, within_s=float(within), budget_us=float(budget), blend_s=float(blend))
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    times = {}
+    for key, unit, most in (("budget_us", "us", MAX_BUDGET_US), ("blend_s", "s", MAX_BLEND_S)):
+        time = value.get(key, 0.0)
+        if not is_number(time) or not 0 <= time <= most:
+            raise ValueError(f"bumpless: {key}: expected 0 to {most:g} {unit}, found {time}")
+        times[key] = float(time)
+    return Bumpless(outputs=outputs, within_s=float(within), **times)

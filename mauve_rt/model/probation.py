@@ -70,7 +70,7 @@ def read_probation(value: object) -> Probation:
         if key not in known:
             raise ValueError(f"unknown key {shown(str(key))}; {did_you_mean(str(key), known)}")
     duration, releases = value.get("probation_s", 0), value.get("releases", 0)
-    if not _is_number(duration) or not 0 < duration <= MAX_PROBATION_S:
+    if not is_number(duration) or not 0 < duration <= MAX_PROBATION_S:
         raise ValueError(f"probation_s: expected more than 0 to {MAX_PROBATION_S:g} s, found {duration}")
     if isinstance(releases, bool) or not isinstance(releases, int) or releases < 0:
         raise ValueError(f"releases: expected a count, found {releases}")
@@ -100,11 +100,12 @@ def _check_limit(limit: Mapping[str, object]) -> None:
     if not isinstance(limit.get("output"), str) or not limit["output"]:
         raise ValueError("revert_on: an output's limit needs the key output: PORT or PORT.FIELD")
     bounds = [limit[key] for key in ("minimum", "maximum") if key in limit]
-    if not all(_is_number(bound) for bound in bounds):
+    if not all(is_number(bound) for bound in bounds):
         raise ValueError(f"revert_on: output {limit['output']}: expected numbers as minimum and maximum")
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Whether it is a finite number, of which YAML has truth values too."""
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 

@@ -432,14 +432,12 @@ def _write_snapshot(ros: Any) -> Request:
 
 def _replacement_value(ros: Any) -> str:
     """The value of a step replace_core; empty: at once, and without probation."""
-    keys = _probation_keys(ros) + [f"bumpless: {ros.bumpless}"] * bool(ros.bumpless)
-    return f"{{{', '.join(keys)}}}" if keys else ""
+    return _value(_probation_keys(ros) + [f"bumpless: {ros.bumpless}"] * bool(ros.bumpless))
 
 
 def _probation_value(ros: Any) -> str:
     """What a reload says of a probation, as the value of a step; empty: there is none."""
-    keys = _probation_keys(ros)
-    return f"{{{', '.join(keys)}}}" if keys else ""
+    return _value(_probation_keys(ros))
 
 
 def _probation_keys(ros: Any) -> list[str]:
@@ -450,6 +448,10 @@ def _probation_keys(ros: Any) -> list[str]:
         f"revert_on: [{', '.join(ros.revert_on)}]",
         f"releases: {ros.probation_releases}",
     ]
+
+
+def _value(keys: list[str]) -> str:
+    return f"{{{', '.join(keys)}}}" if keys else ""
 
 
 def _commit(ros: Any) -> dict[str, Any]:
