@@ -23,8 +23,7 @@ void bind_output_steps(py::module_& module) {
            py::arg("outputs"), py::kw_only(), py::arg("within_ns") = BumplessOptions{}.within_ns,
            py::arg("budget_ns") = 0, py::arg("blend_ns") = 0,
            "`budget_ns`: of the candidate for one release; 0: the component's period. `blend_ns`: so long "
-           "both cores execute, and the "
-           "outputs go over linearly; 0: at once.")
+           "both cores execute, and the outputs go over linearly; 0: at once.")
       .def_readonly("outputs", &BumplessOptions::outputs)
       .def_readonly("within_ns", &BumplessOptions::within_ns, "So long such an instant is waited for.")
       .def_readonly("budget_ns", &BumplessOptions::budget_ns)

@@ -55,15 +55,10 @@ void bind_replacements(py::class_<PyTransaction>& transaction) {
              const std::optional<BumplessOptions>& bumpless) -> Self {
             return self.add([=](Transaction& steps, const PluginRegistry& registry) {
               const ReplaceOptions options{.probation = probation, .bumpless = bumpless};
-              const bool has_options = probation || bumpless;
-              if (is_name(core) && has_options) {
+              if (is_name(core)) {
                 steps.replace_core(component, core.cast<std::string>(), options);
-              } else if (is_name(core)) {
-                steps.replace_core(component, core.cast<std::string>());
-              } else if (has_options) {
-                steps.replace_core(component, make_core(core, registry), options);
               } else {
-                steps.replace_core(component, make_core(core, registry));
+                steps.replace_core(component, make_core(core, registry), options);
               }
             });
           },

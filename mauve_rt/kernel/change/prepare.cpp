@@ -349,13 +349,18 @@ void TransactionCommit::Work::give_back_candidates() noexcept {
     }
     if (changed.awaits_near()) give_back_candidate(changed);
     if (!changed.is_candidate_out) continue;
-    std::unique_ptr<CoreBase> core = std::move(changed.fresh.core);
-    for (Change& change : changes_) {
-      if (change.draft == &changed && change.parts != nullptr && !change.parts->was_taken())
-        core = change.parts->give_back_core();
-    }
-    changed.promoted->resume(std::move(core));
+    std::unique_ptr<CoreBase> core = core_not_taken(changed);
+    changed.promoted->resume(core != nullptr ? std::move(core) : std::move(changed.fresh.core));
   }
+}
+
+/// That was to go into the component; nullptr: it has not come so far.
+std::unique_ptr<CoreBase> TransactionCommit::Work::core_not_taken(const DraftComponent& changed) noexcept {
+  for (Change& change : changes_) {
+    if (change.draft == &changed && change.parts != nullptr && !change.parts->was_taken())
+      return change.parts->give_back_core();
+  }
+  return nullptr;
 }
 
 /// Of a bumpless change that is not made: a candidate that was there before goes on.
@@ -364,12 +369,7 @@ void TransactionCommit::Work::give_back_candidate(const DraftComponent& changed)
       changed.promoted != nullptr ? changed.promoted : changed.candidate;
   if (candidate == nullptr) return;
   candidate->end_await();
-  std::unique_ptr<CoreBase> core;
-  for (Change& change : changes_) {
-    if (change.draft == &changed && change.parts != nullptr && !change.parts->was_taken())
-      core = change.parts->give_back_core();
-  }
-  if (core != nullptr) candidate->resume(std::move(core));
+  if (auto core = core_not_taken(changed)) candidate->resume(std::move(core));
   if (candidate == changed.promoted) return;
   Component& component = *changed.component;
   candidate->conclude(ShadowCause::lost, component.task().clock().now_ns());

@@ -172,6 +172,7 @@ class TransactionCommit::Work final : public std::enable_shared_from_this<Transa
   static void settle_shadow(const DraftComponent& changed);
   void give_back_candidates() noexcept;
   void give_back_candidate(const DraftComponent& changed) noexcept;
+  std::unique_ptr<CoreBase> core_not_taken(const DraftComponent& changed) noexcept;
   void give_back_comebacks() noexcept;
   void let_go(const std::shared_ptr<Component>& component, bool was_listed);
 
