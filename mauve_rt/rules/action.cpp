@@ -202,7 +202,7 @@ bool Action::begin() noexcept {
 }
 
 void Action::call_off() noexcept {
-  if (is_preparable_ && stage_.load(std::memory_order_acquire) == Stage::begun) prepared_->call_off();
+  if (stage_.load(std::memory_order_acquire) == Stage::begun && is_preparable_) prepared_->call_off();
 }
 
 std::optional<Ended> Action::ended() noexcept {
@@ -215,7 +215,8 @@ std::optional<Ended> Action::ended() noexcept {
 // ---- the commit thread
 
 bool Action::commit() noexcept {
-  if (!is_preparable_ || stage_.load(std::memory_order_acquire) != Stage::begun) return false;
+  // The stage first: until it is begun, the preparation thread writes the rest.
+  if (stage_.load(std::memory_order_acquire) != Stage::begun || !is_preparable_) return false;
   MAUVE_EXPECTS(prepared_ != nullptr);
   how_ = how_ended(prepared_->commit(options_.timeouts.commit_ns));
   stage_.store(Stage::over, std::memory_order_release);

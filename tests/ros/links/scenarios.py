@@ -30,8 +30,14 @@ class Outcome:
         return [told.reason.partition(":")[0] for told in self.told[robot] if told.what == "done"]
 
     def instants(self, robot: str, what: str) -> list[float]:
-        """When a robot decided so."""
-        return [told.time_s for told in self.told[robot] if told.what == what]
+        """When a robot decided so, of what was done: one that failed is tried again."""
+        instants, decided_s = [], 0.0
+        for told in self.told[robot]:
+            if told.what == what:
+                decided_s = told.time_s
+            elif told.what == "done" and told.reason.startswith(f"{what}:"):
+                instants.append(decided_s)
+        return instants
 
     def after_s(self, robot: str, what: str) -> float:
         """From the cause to a robot's first `do`; from its end to its last `undo`."""

@@ -109,8 +109,15 @@ class Band:
     def until(self, condition: Callable[[], bool]) -> None:
         deadline_s = time.monotonic() + PATIENCE_S
         while not condition():
-            assert time.monotonic() < deadline_s, f"it did not happen; decisions: {self.said()}"
+            assert time.monotonic() < deadline_s, f"it did not happen; {self.report()}"
             self.spinner.spin_once(timeout_sec=0.1)
+
+    def report(self) -> str:
+        """What is known, for who reads a failure."""
+        executor = self.executor_process
+        ended = f"; the executor ended: {executor.communicate()[1]}" if executor.poll() is not None else ""
+        decided = [f"{decision.decision} ({decision.reason})" for decision in self.decisions]
+        return f"decisions: {decided}; instances: {[state.instance_id for state in self.states]}{ended}"
 
     def await_rest(self) -> None:
         """The peer is heard: the rule is armed, and decides nothing for longer than it waits for anything."""

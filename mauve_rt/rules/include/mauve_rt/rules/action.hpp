@@ -49,6 +49,7 @@ struct ActionReport {
 /// | stage_    | decision thread: ready -> begun, over -> heard; who carries it out: begun -> over; preparation thread: the others | all | acq_rel: whose turn it is, and hands over prepared_ and how_ |
 /// | prepared_ | preparation thread; commit thread while begun                | decision thread while begun | by stage_ |
 /// | how_      | who carries it out                                           | decision thread | by stage_ |
+/// | is_preparable_ | preparation thread                                      | decision thread, commit thread while begun | by stage_ |
 /// | based_on_ | preparation thread                                           | decision thread | release/acquire: the steps are of then or later |
 /// | the rest  | preparation thread                                           | preparation thread | -      |
 class Action {
@@ -60,7 +61,7 @@ class Action {
 
   /// Whether the rule has such an action. [rt]
   bool exists() const MAUVE_RT { return exists_; }
-  /// Whether a real-time thread commits it, once it is ready; else the preparation thread carries it out. [rt]
+  /// Whether a real-time thread commits it, once it was begun; else the preparation thread carries it out. [rt]
   bool is_preparable() const MAUVE_RT { return is_preparable_; }
   /// Whether it was begun, and what came of it is not in the architecture's description yet. [rt]
   bool is_unsettled() const MAUVE_RT { return stage_.load(std::memory_order_acquire) > Stage::ready; }
@@ -117,7 +118,7 @@ class Action {
   const TransactionOptions options_;
   const std::string rule_;
   ActionSteps steps_;
-  bool is_preparable_{true};  // by stage_, as prepared_
+  bool is_preparable_{true};
   std::unique_ptr<PreparedTransaction> prepared_;
   std::unique_ptr<TransactionCommit> committed_;
   std::optional<ActionReport> report_;
