@@ -388,6 +388,8 @@ std::string Shadow::words_of_cause() const {
       return "a stop of the component";
     case ShadowCause::live_fault:
       return "a fault of the new core";
+    case ShadowCause::reverted:
+      return "the old core is the component's core again";
   }
   return {};
 }

@@ -176,22 +176,41 @@ time_ns_t Shadow::execute_old(time_ns_t instant_ns) noexcept {
   return clock_->spent_ns();
 }
 
-void Shadow::write_blended(time_ns_t instant_ns, time_ns_t now_ns) noexcept {
+ShadowCause Shadow::write_blended(time_ns_t instant_ns, time_ns_t now_ns) noexcept {
   const double weight = blend_->weight(instant_ns);
-  if (!blend_->fault.empty()) return end_blend(ShadowCause::fault, instant_ns, now_ns);
-  if (weight >= 1.0 || !is_blending()) return end_blend(ShadowCause::promotion, instant_ns, now_ns);
-  blend_->write(weight);
+  const ShadowCause end = !blend_->fault.empty()            ? ShadowCause::fault
+                          : weight >= 1.0 || !is_blending() ? ShadowCause::promotion
+                                                            : ShadowCause::none;
+  if (end != ShadowCause::none) {
+    end_blend(end, instant_ns, now_ns);
+  } else {
+    blend_->write(weight);
+  }
+  return end;
+}
+
+bool Shadow::give_back_old(std::unique_ptr<CoreBase>& to, time_ns_t now_ns) noexcept {
+  if (blend_ == nullptr || !MAUVE_RT_TRUSTED(blend_->mutex.try_lock())) return false;
+  const bool has_old = is_blending() && blend_->core != nullptr;
+  if (has_old) {
+    MAUVE_RT_TRUSTED(to.swap(blend_->core));
+    has_blended_.store(false, std::memory_order_relaxed);  // relaxed: the phase publishes it
+  }
+  MAUVE_RT_TRUSTED(blend_->mutex.unlock());  // who retires the shadow needs it
+  if (has_old) end_blend(ShadowCause::reverted, now_ns, now_ns);
+  return has_old;
 }
 
 void Shadow::end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) noexcept {
   if (!is_holding_.exchange(false, std::memory_order_acq_rel)) return;
-  if (why == ShadowCause::live_fault) {
+  const bool drops = why == ShadowCause::live_fault || why == ShadowCause::reverted;
+  if (drops) {
     blend_->drop();
   } else {
     blend_->write(why == ShadowCause::stop ? blend_->weight(instant_ns) : 1.0);
   }
   blend_->end();
-  if (why == ShadowCause::live_fault || why == ShadowCause::stop)
+  if (drops || why == ShadowCause::stop)
     awaits_outputs_.store(false, std::memory_order_release);
   conclude(why, now_ns);
 }

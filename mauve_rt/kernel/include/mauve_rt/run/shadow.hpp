@@ -62,6 +62,7 @@ enum class ShadowCause : std::uint8_t {
   overrun,     // of the component, in a blend
   stop,        // of the component, in a blend
   live_fault,  // of the new core, in a blend
+  reverted,    // the old core of a blend went back in
 };
 
 /// One shadow as anyone may see it.
@@ -108,7 +109,8 @@ struct ShadowParts {
 ///
 /// After a bumpless change with a blend (blend.hpp) it has the parts the other way round: the old core is in the shadow's shell, and
 /// executes on the component's thread, at the end of each release, on the inputs that the new core has read in that very release. The
-/// blend ends by its time, by an overrun of the component, a fault of either core, a stop, and by all that ends a shadow.
+/// blend ends by its time, by an overrun of the component, a fault of either core, a stop, and by all that ends a shadow. As long as it
+/// lasts the new core is on probation (probation.hpp): after a fault of the new core the old core goes back in.
 ///
 /// | member            | written by                                  | read by                | order                                |
 /// | ----------------- | ------------------------------------------- | ---------------------- | ------------------------------------ |
@@ -201,11 +203,15 @@ class Shadow {
   /// Before the wait that ends a release: executes the old core, and returns the time that its states declare in virtual time. [rt] as
   /// far as the states are
   time_ns_t execute_old(time_ns_t instant_ns) noexcept;
-  /// Writes the outputs of this release; the last time, those of the new core. [rt]
-  void write_blended(time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
+  /// Writes the outputs of this release; the last time, those of the new core. Why the blend has ended; none: it lasts. [rt]
+  ShadowCause write_blended(time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
   /// Before its time. The outputs that are held are written: at a stop as they would be at the end of the release, after a fault of the
   /// new core not at all, else those of the new core. [rt]
   void end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
+
+  /// Ends the blend with the old core: gives the core away, and drops what the new one has written in this release. False: the blend
+  /// has ended before. [rt]
+  bool give_back_old(std::unique_ptr<CoreBase>& to, time_ns_t now_ns) MAUVE_RT;
 
   /// Ends it when a release of the candidate executes for longer than this. [non-rt]
   void conclude_if_hung(time_ns_t longest_ns) noexcept;
