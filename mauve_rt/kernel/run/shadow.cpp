@@ -322,6 +322,8 @@ void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
 
 void Shadow::set_property(const std::string& name, const PropertyValue& value) {
   const LockGuard lock(figures_mutex_);
+  if (has_ended()) return;
+  set_properties_.clear();
   properties_.emplace_back(name, value);
 }
 

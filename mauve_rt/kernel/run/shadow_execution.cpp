@@ -71,7 +71,10 @@ void Shadow::execute(const ShadowCapture::Release& release) {
     skipped_budget_.fetch_add(1, std::memory_order_relaxed);
     return;
   }
-  take_properties();
+  {
+    const LockGuard lock(figures_mutex_);
+    take_properties();
+  }
   if (const std::byte* const state = capture_.state()) handover_->load(state);
   put_inputs();
   clock_->set_now(release.instant_ns);
@@ -86,12 +89,12 @@ void Shadow::execute(const ShadowCapture::Release& release) {
   compare(release);
 }
 
-void Shadow::take_properties() {
-  const LockGuard lock(figures_mutex_);
+/// Frees nothing: in a blend the component's own thread calls this.
+void Shadow::take_properties() noexcept {
   for (auto& [name, value] : properties_) {
     if (PropertyBase* property = parts_.shell->find_property(name)) property->swap(value);
   }
-  properties_.clear();
+  if (!properties_.empty()) set_properties_.swap(properties_);
 }
 
 void Shadow::put_inputs() {
@@ -150,6 +153,10 @@ bool Shadow::begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_
 time_ns_t Shadow::execute_old(time_ns_t instant_ns) noexcept {
   const std::unique_lock executing(blend_->mutex, std::try_to_lock);  // else it has ended, and is cleaned up
   if (!executing.owns_lock() || !is_blending() || blend_->weight(instant_ns) >= 1.0) return 0;
+  if (figures_mutex_.try_lock()) {  // else before the next execution: this thread waits for no other one
+    const LockGuard lock(figures_mutex_, std::adopt_lock);
+    take_properties();
+  }
   const auto& ports = parts_.shell->ports();
   for (std::size_t place = 0; place < ports.size(); ++place) {
     if (ports[place]->kind() != PortKind::read) continue;

@@ -371,6 +371,23 @@ TYPED_TEST(Blending, TheProbationEndsWithTheBlend) {
   EXPECT_EQ(0.0, this->out->all().back().second.value);
 }
 
+TYPED_TEST(Blending, APropertyIsSetInBothCores) {
+  const auto gain = [](FreeCore& core) {
+    core.exposed_shell().output.write({core.exposed_shell().gain.value()});
+  };
+  this->deploy_old(gain);
+  const time_ns_t instant_ns = this->replace(gain, this->options(s_to_ns(50)));
+  this->wait_written(instant_ns + ms_to_ns(20));
+  AGAIN_IF_LATE()
+  Transaction change;
+  change.set_property("c", "gain", 8.0);
+  this->host.commit(std::move(change));
+  this->host.until([&] { return this->is_late() || this->out->all().back().second.value == 8.0; },
+                   "the same output of both");
+  AGAIN_IF_LATE()
+  EXPECT_EQ(Verdict::running, this->record().verdict);
+}
+
 TYPED_TEST(Blending, AnOverrunEndsTheBlend) {
   // Each core alone fits in the period, both together do not.
   TaskSettings settings;
@@ -526,6 +543,74 @@ TYPED_TEST(Blending, AFallbackCoreDoesNotGoOver) {
 }
 
 class BlendThreads : public Blending<OnThreads> {};
+
+struct BoundedFsm : TestFsm {
+  void define() override {
+    State& run = execution("Run", "act", &TestCore::act, ms_to_ns(50));
+    State& pause = wait("Pause", ms_to_ns(5));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
+TEST_F(BlendThreads, TheWatchdogFindsANewCoreThatHangs) {
+  const auto hangs = std::make_shared<std::atomic<bool>>(false);
+  out = &architecture.add_resource<Recorder<Number>>("out");
+  Component& component = architecture.add_component<TestShell, TestCore, BoundedFsm>("c");
+  component.replace_core(std::make_unique<FreeCore>(constant(1.0)));
+  const CoreBase* const old = &component.core();
+  architecture.connect("c", "output", "out", "write");
+  deploy();
+  host.until([&] { return out->all().size() >= 3; }, "the old core");
+  const time_ns_t instant_ns = replace(
+      [hangs](FreeCore& core) {
+        core.exposed_shell().output.write({10.0});
+        while (*hangs) std::this_thread::yield();
+      },
+      options(s_to_ns(50)));
+  wait_written(instant_ns + ms_to_ns(20));
+  AGAIN_IF_LATE()
+  *hangs = true;
+  wait_state(component, ComponentState::faulted);
+  EXPECT_NE(old, &component.core()) << "the state has not ended";
+  host.until([&] { return out->all().back().second.value == 0.0; }, "safe outputs while it lasts");
+  *hangs = false;
+  wait_state(component, ComponentState::running);
+  EXPECT_EQ(old, &component.core());
+  const time_ns_t back_ns = (*host).now_ns();
+  wait_written(back_ns + ms_to_ns(20));
+  for (const auto& [at_ns, value] : out->from(back_ns)) EXPECT_EQ(1.0, value.value);
+  EXPECT_EQ(ProbationVerdict::reverted, (*host).probations().back().verdict);
+  EXPECT_THAT((*host).probations().back().reason, HasSubstr("Run ran longer than its 50000 us"));
+}
+
+/// The state of the new core has ended: no bound is watched, and the component is late.
+TEST_F(BlendThreads, AnOldCoreThatHangsEndsTheBlendWhenItReturns) {
+  const auto hangs = std::make_shared<std::atomic<bool>>(false);
+  const auto is_hanging = std::make_shared<std::atomic<bool>>(false);
+  Component& component = deploy_old(
+      [hangs, is_hanging](FreeCore& core) {
+        core.exposed_shell().output.write({1.0});
+        *is_hanging = hangs->load();
+        while (*hangs) std::this_thread::yield();
+      },
+      {.hung_after_ns = ms_to_ns(30)});
+  const time_ns_t instant_ns = replace(constant(10.0), options(s_to_ns(50)));
+  wait_written(instant_ns + ms_to_ns(20));
+  AGAIN_IF_LATE()
+  *hangs = true;
+  host.until([&] { return is_hanging->load(); }, "the old core to hang");
+  host.until([&] { return component.task().state_age().is_hung(); }, "the component to be told as hung");
+  (*host).settle_probations();
+  EXPECT_EQ(ComponentState::running, component.task().state());
+  *hangs = false;
+  wait_end();
+  EXPECT_THAT(record().reason, HasSubstr("ended early: an overrun of the component"));
+  wait_written((*host).now_ns());
+  EXPECT_EQ(10.0, out->all().back().second.value);
+  wait_old_cleaned();
+}
 
 TEST_F(BlendThreads, TheComponentsThreadAllocatesNothing) {
   Component& component = deploy_old(constant(0.0));

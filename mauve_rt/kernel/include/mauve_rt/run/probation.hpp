@@ -128,6 +128,9 @@ struct ProbationRecord {
 /// properties and connecting ports do not end it: these stay as they are when the old core is put back. A stop does not end it:
 /// the time goes on. Cleaning up, configuring anew, removing the component, and a shutdown of the host end it as inconclusive.
 /// It has precedence over a fallback core, which stays ready for later.
+///
+/// A new core whose outputs go over (blend.hpp) is on probation for faults and requests, as long as the blend lasts. The old core executes
+/// in the blend until it goes back in, with the state that it has by then. A state that does not end is not given up.
 /// A change that was prepared to replace the core before the old one was put back is refused by its adopt, and stale once the
 /// revert was settled.
 ///

@@ -119,7 +119,7 @@ struct ShadowParts {
 /// | ended_ns_, cause_ | who ends it                                 | anyone                 | phase_                               |
 /// | capture_          | the component's thread, who executes        | both                   | its own: shadow_capture.hpp          |
 /// | parts_ ... debt_  | who executes, prepares, suspends, retires   | same                   | run_mutex_                           |
-/// | figures_ ... properties_ | who executes, or sets              | anyone but the component's thread | figures_mutex_           |
+/// | figures_ ... set_properties_ | who executes, or sets       | same                   | figures_mutex_                       |
 /// | signal_           | before it begins                            | the component's thread | the commit publishes it              |
 /// | handover_         | [setup]                                     | who begins it          | -                                    |
 /// | steps_            | who makes it wait for near outputs          | who executes, or tells; the component's thread | figures_mutex_; the commit publishes it |
@@ -135,7 +135,7 @@ struct ShadowParts {
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
 ///
-/// The component's thread takes neither mutex, but in virtual time, where there is one thread.
+/// The component's thread waits for neither mutex, but in virtual time, where there is one thread.
 class Shadow {
  public:
   /// A change waits so long for a state of the candidate to end, on a thread that gets little time.
@@ -281,7 +281,7 @@ class Shadow {
   }
   bool run_oldest() noexcept MAUVE_REQUIRES(run_mutex_);
   void execute(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
-  void take_properties();
+  void take_properties() noexcept MAUVE_REQUIRES(figures_mutex_);
   void put_inputs();
   bool advance_to(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
   bool is_blending() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kBlending; }
@@ -336,6 +336,8 @@ class Shadow {
   std::string fault_ MAUVE_GUARDED_BY(figures_mutex_){};
   std::vector<std::pair<std::string, PropertyValue>> properties_
       MAUVE_GUARDED_BY(figures_mutex_){};  // to be set
+  std::vector<std::pair<std::string, PropertyValue>> set_properties_
+      MAUVE_GUARDED_BY(figures_mutex_){};  // the values before; the next caller of set_property() frees them
   std::vector<std::pair<std::size_t, OutputComparison>> comparisons_
       MAUVE_GUARDED_BY(figures_mutex_);  // by the port's place in the shell
 };
