@@ -217,8 +217,7 @@ void Shadow::end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) 
     blend_->write(why == ShadowCause::stop ? blend_->weight(instant_ns) : 1.0);
   }
   blend_->end();
-  if (drops || why == ShadowCause::stop)
-    awaits_outputs_.store(false, std::memory_order_release);
+  if (drops || why == ShadowCause::stop) awaits_outputs_.store(false, std::memory_order_release);
   conclude(why, now_ns);
 }
 

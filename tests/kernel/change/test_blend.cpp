@@ -144,12 +144,11 @@ class Blending : public OnBothHosts<Way> {
 TYPED_TEST_SUITE(Blending, EveryHost, HostNames);
 
 /// A computer that stalls for longer than a period has ended the blend: the case begins once more.
-#define AGAIN_IF_LATE()                                             \
-  if (this->is_late()) {                                            \
-    if (++this->late_runs == 5)                                     \
-      GTEST_SKIP() << "a busy computer has ended the blend 5 times"; \
-    this->begin_again();                                            \
-    return this->TestBody();                                        \
+#define AGAIN_IF_LATE()                                                                        \
+  if (this->is_late()) {                                                                       \
+    if (++this->late_runs == 5) GTEST_SKIP() << "a busy computer has ended the blend 5 times"; \
+    this->begin_again();                                                                       \
+    return this->TestBody();                                                                   \
   }
 
 TYPED_TEST(Blending, OutputsGoOverLinearly) {

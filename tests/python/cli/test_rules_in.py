@@ -164,9 +164,7 @@ def test_steps_that_the_executor_cannot_make_ready(check: Check, step: str) -> N
     assert errors[0].startswith("rules:6:27: the executor cannot make")
 
 
-@pytest.mark.parametrize(
-    "value", ["{bumpless: {outputs: {count.data: 1}, blend_s: 1}}", "{probation_s: 1}"]
-)
+@pytest.mark.parametrize("value", ["{bumpless: {outputs: {count.data: 1}, blend_s: 1}}", "{probation_s: 1}"])
 def test_options_that_the_executor_cannot_make_ready(check: Check, value: str) -> None:
     do = f"[{{kind: replace_core, target: one, name: executor_tests/Backwards, value: {value}}}]"
     for robot in (WIDE, ""):

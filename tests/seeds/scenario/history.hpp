@@ -120,9 +120,9 @@ class History {
   void check_copy(const Execution& execution) {
     const std::int64_t copied = execution.count - 1;
     const auto& counts = counts_[execution.component];
-    findings_.expect(copied == 0 || counts.contains(copied),
-                     where(execution) + " has the count " + std::to_string(copied) +
-                         ", which no core of the component had");
+    findings_.expect(copied == 0 || counts.contains(copied), where(execution) + " has the count " +
+                                                                 std::to_string(copied) +
+                                                                 ", which no core of the component had");
     findings_.count("copies of state");
     const auto last = last_.find(execution.component);
     if (execution.is_in_shadow || last == last_.end()) return;
@@ -132,9 +132,9 @@ class History {
     });
     if (swaps != 1) return;
     findings_.count("copies of state at a promotion");
-    findings_.expect(copied == last->second->count,
-                     where(execution) + " was promoted with the count " + std::to_string(copied) +
-                         ", expected " + std::to_string(last->second->count));
+    findings_.expect(copied == last->second->count, where(execution) + " was promoted with the count " +
+                                                        std::to_string(copied) + ", expected " +
+                                                        std::to_string(last->second->count));
   }
   void check_count(const Execution& execution) {
     const std::int64_t expected = count_of(execution.core) + 1;
@@ -323,11 +323,11 @@ class History {
   std::map<int, Verdict> verdicts_;
   std::map<int, int> took_from_;
   std::map<int, std::int64_t> took_count_;
-  std::set<int> copied_;                         // candidates
-  std::set<int> lived_;                          // cores that have executed in their component
+  std::set<int> copied_;                          // candidates
+  std::set<int> lived_;                           // cores that have executed in their component
   std::map<int, std::set<std::int64_t>> counts_;  // by component
-  std::map<int, std::int64_t> last_counts_;  // by core
-  std::map<int, time_ns_t> last_clocks_;     // by component
+  std::map<int, std::int64_t> last_counts_;       // by core
+  std::map<int, time_ns_t> last_clocks_;          // by component
 };
 
 }  // namespace mauve::testing

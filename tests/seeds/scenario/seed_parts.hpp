@@ -71,17 +71,18 @@ struct Shared {
   bool has_shut_down{false};
   int interventions{0};     // requests that start, stop or change components
   std::set<int> stopped{};  // components that a stop has ended, and that no request has started since
-  std::map<int, std::string> cores{};       // alive
-  std::map<int, int> took_from{};           // whose state each core took over
-  std::set<int> copied{};                   // candidates that begin, and are promoted, with copies of the state of the live core
+  std::map<int, std::string> cores{};  // alive
+  std::map<int, int> took_from{};      // whose state each core took over
+  std::set<int>
+      copied{};  // candidates that begin, and are promoted, with copies of the state of the live core
   std::map<int, std::int64_t> took_count{};  // what was taken over from one of them
-  std::map<int, Hang> hung_cores{};         // also those that have returned
-  std::multiset<int> hanging_components{};  // once for each core of theirs that hangs
-  std::set<int> hung_components{};          // also those whose cores have returned
-  std::set<int> bad_guards{};               // components whose guard misbehaved
-  int hanging{0};                           // cores
-  time_ns_t returned_ns{0};                 // when the last core returned
-  time_ns_t returned_excuses_ns{0};         // stalls and slowness before that
+  std::map<int, Hang> hung_cores{};          // also those that have returned
+  std::multiset<int> hanging_components{};   // once for each core of theirs that hangs
+  std::set<int> hung_components{};           // also those whose cores have returned
+  std::set<int> bad_guards{};                // components whose guard misbehaved
+  int hanging{0};                            // cores
+  time_ns_t returned_ns{0};                  // when the last core returned
+  time_ns_t returned_excuses_ns{0};          // stalls and slowness before that
   std::vector<Visit> visits{};
   std::multiset<int> configured{};  // components whose hooks a client calls
 };

@@ -115,7 +115,7 @@ class PartsChange final : public CommitAction {
   void set_probation(std::shared_ptr<Probation> probation) noexcept { probation_ = std::move(probation); }
   /// Gives the probation away; nullptr: there is none. [non-rt]
   std::shared_ptr<Probation> release_probation() noexcept { return std::move(probation_); }
-  /// Of a bumpless change only where the outputs go over.
+  /// Of a bumpless change only where the outputs go over. [non-rt]
   bool has_probation() const noexcept;
   /// The new core is the candidate of the component's shadow. Unless it is `fresh` it gets copies of the old core's state fields. [setup]
   void promote(bool is_fresh) noexcept {

@@ -71,7 +71,7 @@ enum class ProbationCause : std::uint8_t {
   fell_back,  // inconclusive: the new core faulted, which on_fault did not watch, and the fallback core took over
   ended,      // inconclusive: the component was cleaned up or removed, or its host was shut down
   blend_ended,  // inconclusive: the blend ended before its time
-  hung,       // reverted: a state of the new core does not end, and the old core goes on by another thread
+  hung,         // reverted: a state of the new core does not end, and the old core goes on by another thread
 };
 
 /// One probation as anyone may see it.
