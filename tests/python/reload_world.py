@@ -87,7 +87,10 @@ class World:
 def make_world(
     kind: str, folder: Path, alternatives: str, executor: str = "", settings: str = ""
 ) -> Iterator[World]:
-    """The architecture, until the test ends. `kind`: as in WORLDS; `executor`: its settings; `settings`: the loop's."""
+    """The architecture, until the test ends.
+
+    `kind`: as in WORLDS; `executor`: its settings; `settings`: those of the loop.
+    """
     path = folder / "robot.yaml"
     text = FILE.replace("ALTERNATIVES", alternatives + settings).replace("EXECUTOR", executor)
     path.write_text(text, encoding="utf-8")
