@@ -18,6 +18,7 @@ from mauve_rt.supervision.rules import Rule, RulesFile
 
 UNPREPARED = "the executor cannot make a step of kind {} ready for a rule"
 REMEDY = "give the rule `in: supervisor`, or do it by steps about what is there"
+AT_ONCE = "a rule of the executor replaces a core at once: with neither a probation nor `bumpless`"
 IN_PYTHON = (
     "core {} is written in Python: to put it in needs the interpreter's lock, which something else may hold "
     "for long, and then its component comes too late"
@@ -48,6 +49,8 @@ def unprepared(file: RulesFile, index: int, plugins: PluginIndex) -> Iterator[Pr
     for place, step in _placed(rule, index):
         if not STEP_KINDS[step.kind].is_prepared:
             yield file.problem(place, UNPREPARED.format(step.kind), remedy=REMEDY)
+        if step.kind == "replace_core" and step.value:
+            yield file.problem((*place, "value"), AT_ONCE, remedy="give the rule `in: supervisor`")
         core = plugins.find("core", step.name) if STEP_KINDS[step.kind].name == "core" else None
         if core is not None and core.is_python:
             yield file.problem((*place, "name"), IN_PYTHON.format(core.name), remedy=CPP_REMEDY)

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <algorithm>
+#include <memory>
 
 #include "transaction_fixtures.hpp"
 
@@ -175,6 +176,15 @@ class OnBothHosts : public ::testing::Test {
     host.shutdown();
   }
   static constexpr bool is_virtual = std::is_same_v<Way, InVirtualTime>;
+  /// For a case that a busy computer has spoilt: an architecture and a host as at the begin.
+  void begin_again() {
+    if constexpr (!is_virtual) run_on_where_sanitized();
+    host.shutdown();
+    std::destroy_at(&host);
+    std::destroy_at(&architecture);
+    std::construct_at(&architecture);
+    std::construct_at(&host, architecture);
+  }
   Component& add(const std::string& name, std::int64_t period_ms = 1, const TaskSettings& settings = {}) {
     Component& component = architecture.add_component<TestShell, TestCore, TestFsm>(name, settings);
     component.set_property("period_ms", period_ms);

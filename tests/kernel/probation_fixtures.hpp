@@ -40,7 +40,8 @@ class Probations : public OnBothHosts<Way> {
   using Base = OnBothHosts<Way>;
 
   /// A component whose core counts what it does, and writes 1.
-  Component& add_trial(const std::string& name = "c", const TaskSettings& settings = {}) {
+  Component& add_trial(const std::string& name = "c", const TaskSettings& settings = {},
+                       const std::string& written = "") {
     Component& component = this->add(name, 1, settings);
     auto first = std::make_unique<TrialCore>();
     first->set_implementation("t/Old");
@@ -50,7 +51,7 @@ class Probations : public OnBothHosts<Way> {
     old_seen = first->seen;
     component.replace_core(std::move(first));
     out = &this->architecture.template add_resource<SharedData<Number>>("out_" + name);
-    this->architecture.connect(name, "output", "out_" + name, "write");
+    this->architecture.connect(name, "output", written.empty() ? "out_" + name : written, "write");
     return component;
   }
   /// Puts in a core on probation, which does this at each of its runs, counted from 1.

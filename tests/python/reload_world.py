@@ -84,10 +84,15 @@ class World:
         return next(int(info.generation) for info in component_infos(self.runtime) if info.name == name)
 
 
-def make_world(kind: str, folder: Path, alternatives: str, executor: str = "") -> Iterator[World]:
-    """The architecture, until the test ends. `kind`: as in WORLDS; `executor`: its settings."""
+def make_world(
+    kind: str, folder: Path, alternatives: str, executor: str = "", settings: str = ""
+) -> Iterator[World]:
+    """The architecture, until the test ends.
+
+    `kind`: as in WORLDS; `executor`: its settings; `settings`: those of the loop.
+    """
     path = folder / "robot.yaml"
-    text = FILE.replace("ALTERNATIVES", alternatives).replace("EXECUTOR", executor)
+    text = FILE.replace("ALTERNATIVES", alternatives + settings).replace("EXECUTOR", executor)
     path.write_text(text, encoding="utf-8")
     if kind == "threads":
         runtime = Runtime(lambda: load_architecture(path))

@@ -67,8 +67,10 @@ inline void random_ends(std::uint64_t seed, seeds::Findings& findings) {
     }
     if (dice.once_in(2)) {
       Transaction change;
+      const bool is_fresh = dice.once_in(2);
+      if (!is_fresh) shared->copied.insert(1);
       change.shadow("c", std::make_unique<SeedCore>(shared, 0, 1, Manner{}, seed),
-                    {.budget_ns = ms_to_ns(1), .is_fresh = true}, std::make_unique<TestShell>());
+                    {.budget_ns = ms_to_ns(1), .is_fresh = is_fresh}, std::make_unique<TestShell>());
       try {
         deployer.commit(std::move(change), {.timeouts = {.phase_ns = 0}});
       } catch (const Error&) {  // a stall may be longer than the bound of a state

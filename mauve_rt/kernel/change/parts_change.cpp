@@ -192,6 +192,19 @@ bool PartsChange::adopt() {
   return kept_core_ == component_.parts_.core.get();
 }
 
+bool PartsChange::has_probation() const noexcept {
+  return probation_ != nullptr && (!taken_ || probation_->has_begun());
+}
+
+bool PartsChange::take_old_core() noexcept {
+  if (parts_.core != nullptr) return true;
+  if (candidate_ == nullptr || !candidate_->give_back_old(parts_.core, component_.task_.clock().now_ns()))
+    return false;
+  parts_.core->bind_shell(*component_.parts_.shell);  // that it had before
+  parts_.core->set_context(&component_.task_.context());
+  return true;
+}
+
 void PartsChange::exchange_core() noexcept {
   std::swap(parts_.core, component_.parts_.core);
   component_.present_core_.store(component_.parts_.core.get(), std::memory_order_release);
@@ -226,7 +239,7 @@ void PartsChange::put_back() noexcept {
 }
 
 void PartsChange::take() noexcept {
-  component_.task_.end_probation(is_fallback_);
+  component_.task_.end_probation(is_fallback_ ? ProbationCause::fell_back : ProbationCause::replaced);
   const bool may_blend =
       candidate_ != nullptr && parts_.core != nullptr && candidate_->may_blend(*component_.parts_.core);
   const ShadowCause why = promotes_ ? ShadowCause::promotion : ShadowCause::changed;
@@ -254,7 +267,8 @@ void PartsChange::take() noexcept {
     take_over_events(*parts_.fsm, component_.task_.keep_place(kept_waits_, period_ns_));
   component_.task_.set_machine(*component_.parts_.shell, *component_.parts_.fsm, &component_.binding_,
                                period_ns_);
-  if (probation_ != nullptr) probation_->begin(*this);
+  const bool blends = may_blend && parts_.core == nullptr;
+  if (probation_ != nullptr && (blends || !probation_->is_of_blend())) probation_->begin(*this);
 }
 
 bool PartsChange::make_safe(bool may_wait, time_ns_t time_ns) noexcept {

@@ -283,6 +283,9 @@ void TransactionCommit::Work::prepare_parts(Change& change) {
   }
   if (draft.is_repaired() || draft.is_made_anew) change.parts->start_afresh();
   if (draft.promoted != nullptr && !draft.awaits_near()) change.parts->promote(draft.is_fresh);
+  const time_ns_t blend_ns = draft.bumpless.value_or(BumplessOptions{}).blend_ns;
+  if (draft.awaits_near() && blend_ns != 0)  // a fault ends it with the old core
+    draft.probation = ProbationOptions{.duration_ns = blend_ns, .is_blend = true};
   if (draft.probation) {
     const auto& candidate = change.parts->candidate();
     const std::string core =

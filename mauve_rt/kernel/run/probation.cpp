@@ -247,7 +247,8 @@ void Probation::end(Phase phase, ProbationCause why) noexcept {
 }
 
 bool Probation::put_back() noexcept {
-  if (found_.cause == ProbationCause::none || !begin_end()) return false;
+  if (found_.cause == ProbationCause::none || !MAUVE_RT_TRUSTED(parts_->take_old_core()) || !begin_end())
+    return false;
   parts_->put_back();
   end(kReverted, found_.cause);
   return true;
@@ -289,7 +290,7 @@ bool Probation::is_executing() noexcept {
   if (task.is_left_behind()) return true;
   const StateAge age = task.state_age();
   if (age.is_wait || age.age_ns == 0 || !is_watched()) return false;
-  if (age.age_ns > age.hung_after_ns) task.give_up_on_probation(age);
+  if (age.age_ns > age.hung_after_ns && !options_.is_blend) task.give_up_on_probation(age);
   return true;
 }
 
@@ -449,6 +450,8 @@ std::string Probation::reason() const {
     }
     case ProbationCause::ended:
       return "the component was cleaned up or removed, or its host was shut down";
+    case ProbationCause::blend_ended:
+      return "the blend of the outputs ended early";
   }
   return {};
 }

@@ -322,6 +322,8 @@ void Shadow::resume(std::unique_ptr<CoreBase> core) noexcept {
 
 void Shadow::set_property(const std::string& name, const PropertyValue& value) {
   const LockGuard lock(figures_mutex_);
+  if (has_ended()) return;
+  set_properties_.clear();
   properties_.emplace_back(name, value);
 }
 
@@ -388,6 +390,8 @@ std::string Shadow::words_of_cause() const {
       return "a stop of the component";
     case ShadowCause::live_fault:
       return "a fault of the new core";
+    case ShadowCause::reverted:
+      return "the old core is the component's core again";
   }
   return {};
 }

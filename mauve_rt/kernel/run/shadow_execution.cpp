@@ -71,7 +71,10 @@ void Shadow::execute(const ShadowCapture::Release& release) {
     skipped_budget_.fetch_add(1, std::memory_order_relaxed);
     return;
   }
-  take_properties();
+  {
+    const LockGuard lock(figures_mutex_);
+    take_properties();
+  }
   if (const std::byte* const state = capture_.state()) handover_->load(state);
   put_inputs();
   clock_->set_now(release.instant_ns);
@@ -86,12 +89,12 @@ void Shadow::execute(const ShadowCapture::Release& release) {
   compare(release);
 }
 
-void Shadow::take_properties() {
-  const LockGuard lock(figures_mutex_);
+/// Frees nothing: in a blend the component's own thread calls this.
+void Shadow::take_properties() noexcept {
   for (auto& [name, value] : properties_) {
     if (PropertyBase* property = parts_.shell->find_property(name)) property->swap(value);
   }
-  properties_.clear();
+  if (!properties_.empty()) set_properties_.swap(properties_);
 }
 
 void Shadow::put_inputs() {
@@ -150,6 +153,10 @@ bool Shadow::begin_blend(std::unique_ptr<CoreBase>& old, std::size_t wait, time_
 time_ns_t Shadow::execute_old(time_ns_t instant_ns) noexcept {
   const std::unique_lock executing(blend_->mutex, std::try_to_lock);  // else it has ended, and is cleaned up
   if (!executing.owns_lock() || !is_blending() || blend_->weight(instant_ns) >= 1.0) return 0;
+  if (figures_mutex_.try_lock()) {  // else before the next execution: this thread waits for no other one
+    const LockGuard lock(figures_mutex_, std::adopt_lock);
+    take_properties();
+  }
   const auto& ports = parts_.shell->ports();
   for (std::size_t place = 0; place < ports.size(); ++place) {
     if (ports[place]->kind() != PortKind::read) continue;
@@ -176,23 +183,41 @@ time_ns_t Shadow::execute_old(time_ns_t instant_ns) noexcept {
   return clock_->spent_ns();
 }
 
-void Shadow::write_blended(time_ns_t instant_ns, time_ns_t now_ns) noexcept {
+ShadowCause Shadow::write_blended(time_ns_t instant_ns, time_ns_t now_ns) noexcept {
   const double weight = blend_->weight(instant_ns);
-  if (!blend_->fault.empty()) return end_blend(ShadowCause::fault, instant_ns, now_ns);
-  if (weight >= 1.0 || !is_blending()) return end_blend(ShadowCause::promotion, instant_ns, now_ns);
-  blend_->write(weight);
+  const ShadowCause end = !blend_->fault.empty()            ? ShadowCause::fault
+                          : weight >= 1.0 || !is_blending() ? ShadowCause::promotion
+                                                            : ShadowCause::none;
+  if (end != ShadowCause::none) {
+    end_blend(end, instant_ns, now_ns);
+  } else {
+    blend_->write(weight);
+  }
+  return end;
+}
+
+bool Shadow::give_back_old(std::unique_ptr<CoreBase>& to, time_ns_t now_ns) noexcept {
+  if (blend_ == nullptr || !MAUVE_RT_TRUSTED(blend_->mutex.try_lock())) return false;
+  const bool has_old = is_blending() && blend_->core != nullptr;
+  if (has_old) {
+    MAUVE_RT_TRUSTED(to.swap(blend_->core));
+    has_blended_.store(false, std::memory_order_relaxed);  // relaxed: the phase publishes it
+  }
+  MAUVE_RT_TRUSTED(blend_->mutex.unlock());  // who retires the shadow needs it
+  if (has_old) end_blend(ShadowCause::reverted, now_ns, now_ns);
+  return has_old;
 }
 
 void Shadow::end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) noexcept {
   if (!is_holding_.exchange(false, std::memory_order_acq_rel)) return;
-  if (why == ShadowCause::live_fault) {
+  const bool drops = why == ShadowCause::live_fault || why == ShadowCause::reverted;
+  if (drops) {
     blend_->drop();
   } else {
     blend_->write(why == ShadowCause::stop ? blend_->weight(instant_ns) : 1.0);
   }
   blend_->end();
-  if (why == ShadowCause::live_fault || why == ShadowCause::stop)
-    awaits_outputs_.store(false, std::memory_order_release);
+  if (drops || why == ShadowCause::stop) awaits_outputs_.store(false, std::memory_order_release);
   conclude(why, now_ns);
 }
 

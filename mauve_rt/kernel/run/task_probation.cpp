@@ -6,11 +6,9 @@
 
 namespace mauve {
 
-void Task::end_probation(bool falls_back) noexcept {
+void Task::end_probation(ProbationCause why) noexcept {
   if (!probation_.is_set()) return;
-  probation_.use([&](Probation& probation) {
-    probation.conclude(falls_back ? ProbationCause::fell_back : ProbationCause::replaced);
-  });
+  probation_.use([&](Probation& probation) { probation.conclude(why); });
   probation_.revoke(kForever);  // waits for no thread: who runs the machine is the only user
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A task's part in the shadow of its component (shadow.hpp): it has each release captured.
+#include "mauve_rt/run/probation.hpp"
 #include "mauve_rt/run/shadow.hpp"
 #include "mauve_rt/run/task.hpp"
 
@@ -22,8 +23,13 @@ void Task::end_shadow(ShadowCause why) noexcept {
 }
 
 void Task::leave_shadow() noexcept {
-  shadow_.use([](Shadow& shadow) { shadow.detach(); });
+  bool was_blending = false;
+  shadow_.use([&](Shadow& shadow) {
+    was_blending = shadow.is_holding();
+    shadow.detach();
+  });
   shadow_.revoke(kForever);  // waits for no thread: who runs the machine is the only user
+  if (was_blending) end_probation(ProbationCause::blend_ended);
 }
 
 void Task::note_swap(time_ns_t instant_ns) noexcept {
@@ -49,11 +55,18 @@ void Task::blend_release() noexcept {
   machine_.clock().spend(blending->execute_old(machine_.clock_ns()));
   const time_ns_t now_ns = machine_.look_at_clock();
   if (machine_.is_late()) return end_blend(ShadowCause::overrun);
-  blending->write_blended(machine_.clock_ns(), now_ns);
+  const ShadowCause end = blending->write_blended(machine_.clock_ns(), now_ns);
+  if (end == ShadowCause::none) return;
+  end_probation(end == ShadowCause::promotion ? ProbationCause::none : ProbationCause::blend_ended);
 }
 
 void Task::end_blend(ShadowCause why) noexcept {
-  shadow_.use([&](Shadow& shadow) { shadow.end_blend(why, machine_.clock_ns(), clock().now_ns()); });
+  bool was_blending = false;
+  shadow_.use([&](Shadow& shadow) {
+    was_blending = shadow.is_holding();
+    shadow.end_blend(why, machine_.clock_ns(), clock().now_ns());
+  });
+  if (was_blending) end_probation(ProbationCause::blend_ended);
 }
 
 /// A release has reached its next wait.

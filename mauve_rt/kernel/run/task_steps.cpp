@@ -227,12 +227,13 @@ void Task::tell_over_declared() noexcept {
 }
 
 void Task::end_in_fault(bool has_taken_change) noexcept {
-  end_blend(ShadowCause::live_fault);
   const bool is_violation = note_fault_on_probation();
+  if (!is_violation) end_blend(ShadowCause::live_fault);
   const bool has_new_parts = settle_slot() || has_taken_change;
   if (machine_.execution().has_timed_out()) return park_timed_out(has_new_parts);  // in the take of new parts
   machine_.trace(TraceKind::fault, machine_.state_name(), machine_.clock_ns());
   if (is_violation && put_back_after_fault(has_new_parts)) return;
+  end_blend(ShadowCause::live_fault);
   write_outputs(false);
   const bool stays = has_new_parts || !machine_.is_started() || is_to_stop() || is_taken_over();
   is_falling_back_.store(true, std::memory_order_relaxed);  // relaxed: the exchange publishes it

@@ -843,6 +843,25 @@ TEST_F(ProbationHangs, TheOldCoreThatCouldNotComeBackIsInAfterACleanup) {
   wait_cleaned(*seen);
 }
 
+TEST_F(ProbationHangs, AnOutputWithMaxSlewGoesOnFromItsLastValue) {
+  TaskSettings settings = kSettings;
+  settings.max_slew = {{"output.value", 100.0}};  // 0.1 a release
+  auto& sink = architecture.add_resource<RingBuffer<Number>>("sink", 1'000'000);
+  add_trial("c", settings, "sink");
+  const auto component = await_successor(put_in_one_that_hangs());
+  wait_seen(*old_seen, old_seen->runs + 30);
+  std::vector<double> all;
+  Number value;
+  time_ns_t time_ns = 0;
+  ReaderState reader;
+  while (sink.read.read(value, time_ns, reader) == DataStatus::new_data) all.push_back(value.value);
+  const auto safe = std::find(all.rbegin(), all.rend(), 0.0).base();
+  ASSERT_NE(all.end(), safe) << "from the safe value on";
+  EXPECT_NEAR(0.1, *safe, 1e-9);
+  EXPECT_EQ(1.0, all.back());
+  doors->open = true;
+}
+
 TEST_F(ProbationHangs, ItIsOnProbationAgainAndStopped) {
   add_trial("c", kSettings);
   const auto component = await_successor(put_in_one_that_hangs());

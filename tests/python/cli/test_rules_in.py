@@ -164,5 +164,16 @@ def test_steps_that_the_executor_cannot_make_ready(check: Check, step: str) -> N
     assert errors[0].startswith("rules:6:27: the executor cannot make")
 
 
+@pytest.mark.parametrize("value", ["{bumpless: {outputs: {count.data: 1}, blend_s: 1}}", "{probation_s: 1}"])
+def test_options_that_the_executor_cannot_make_ready(check: Check, value: str) -> None:
+    do = f"[{{kind: replace_core, target: one, name: executor_tests/Backwards, value: {value}}}]"
+    for robot in (WIDE, ""):
+        _, _, (error,) = check(rule(undo="", do=do), robot=robot)
+        assert error.startswith("rules:5:")
+        assert "replaces a core at once: with neither a probation nor `bumpless`" in error
+        assert error.endswith("; give the rule `in: supervisor`")
+    assert check(rule(undo="", do=do, more="    in: supervisor\n"))[0] == 0
+
+
 def test_all_other_steps_can_be_made_ready() -> None:
     assert set(STEPS) == {kind for kind, what in STEP_KINDS.items() if not what.is_prepared}

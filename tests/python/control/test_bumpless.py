@@ -13,6 +13,7 @@ from reload_world import WORLDS, World, make_world_of_bad_cores
 from mauve_msgs.msg import StepReport
 from mauve_rt.cli.bumpless import add_bumpless, bumpless_text
 from mauve_rt.cli.views import report_lines
+from mauve_rt.control.probations import Verdict
 from mauve_rt.control.requests import Code, Step
 from mauve_rt.interfaces.descriptions import component_infos, step_reports
 from mauve_rt.model.bumpless import read_bumpless
@@ -66,6 +67,54 @@ def test_a_blend_lasts_until_a_step_ends_it(world: World) -> None:
         read = ReadShadow.of_message(_shadow_message(world), 0)
     assert read.verdict == "promoted"
     assert read.reason in (f"{ended}a step end_shadow", f"{ended}an overrun of the component")
+    assert world.mean_step() == 1.0
+
+
+def _decided_blend(world: World) -> str:
+    """The verdict of a core that throws in its third release; it may be in the shadow for the first ones."""
+    value = "{bumpless: {outputs: {sum.data: 1e9}, within_s: 60, blend_s: 60}}"
+    if not world.ask(_replace("Throws", value)).success:
+        return "refused"
+    while (record := world.runtime.probations()[-1]).verdict == "running":
+        world.run(5)
+        world.runtime.host.settle_probations()
+    return str(record.verdict)
+
+
+def test_a_fault_of_the_new_core_ends_the_blend_with_the_old_one(world: World) -> None:
+    for _ in range(5):
+        before = world.sum()[0]
+        verdict = _decided_blend(world)
+        if verdict == "reverted":
+            break
+        # A busy computer: the fault came in the shadow, or an overrun had ended the blend.
+        if verdict == "inconclusive":
+            world.run(50)
+            repair = world.ask(Step("replace_core", "loop", "reload_tests/Loop"), Step("start", "loop"))
+            assert repair.success, repair.message
+    else:
+        pytest.skip("a busy computer has ended the blend 5 times")
+    part = world.part()
+    assert (part.core, part.state) == ("reload_tests/Loop", "RUNNING")
+    assert world.mean_step() == 1.0
+    assert world.sum()[0] > before, "the sum goes on"
+    assert ReadShadow.of_message(_shadow_message(world), 0).verdict == "ended"
+    record = world.runtime.probations()[-1]
+    assert record.reason == "fault: the new code is broken in state act"
+    assert "reload_tests/Loop is back" in Verdict(record).message
+
+
+def test_a_request_ends_the_blend_with_the_old_core(world: World) -> None:
+    value = "{bumpless: {outputs: {sum.data: 1e9}, within_s: 60, blend_s: 60}}"
+    for _ in range(5):
+        assert world.ask(_replace("Other", value)).success
+        if world.ask(Step("revert_core", "loop")).success:
+            break
+        assert world.ask(Step("replace_core", "loop", "reload_tests/Loop")).success  # an overrun was first
+    else:
+        pytest.skip("a busy computer has ended the blend 5 times")
+    world.run(5)
+    assert world.part().core == "reload_tests/Loop"
     assert world.mean_step() == 1.0
 
 

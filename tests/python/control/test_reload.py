@@ -91,6 +91,19 @@ def test_another_shell_comes_with_its_component(world: World, rebuilt: RebuiltPa
     assert world.mean_step() == 2.0
 
 
+def test_max_slew_goes_on_over_a_reload(rebuilt: RebuiltPackage, tmp_path: Path) -> None:
+    worlds = make_world("virtual time", tmp_path, "[]", settings=", max_slew: {sum.data: 2000}")
+    world = next(worlds)
+    rebuilt.build("OTHER_SHELL", "STEP=1000.0")
+    before, first = world.sum()
+    assert world.reload().success
+    after, last = world.sum()
+    assert last > first
+    assert after - before <= 2.0 * (last - first), "the first output of the new code moves no faster"
+    assert world.mean_step() == 2.0
+    assert next(worlds, None) is None
+
+
 def test_state_that_does_not_fit_is_told(world: World, rebuilt: RebuiltPackage) -> None:
     rebuilt.build("OTHER_STATE")
     outcome = world.reload()

@@ -186,14 +186,13 @@ class Changes : protected Checks {
     part.input = written_by(target);
   }
 
-  /// Gives a component a shadow; of one that has a shadow promotes or ends it. The candidate keeps its own count, which the history
-  /// follows.
+  /// Gives a component a shadow; of one that has a shadow promotes or ends it. A fresh candidate keeps its own count.
   void enter_shadow(Draft& draft, std::size_t index, Dice& dice) {
     Part& part = draft.after[index];
     for (const ShadowRecord& shadow : deployer_->shadows()) {
       if (shadow.component != part.name || shadow.verdict != ShadowVerdict::running) continue;
       if (dice.once_in(2)) {
-        draft.transaction.promote(part.name, {.is_fresh = true});
+        draft.transaction.promote(part.name, {.is_fresh = !shared_->copied.contains(core_of(shadow.core))});
         part.core = core_of(shadow.core);
         draft.text += " promote " + part.name;
       } else {
@@ -206,8 +205,10 @@ class Changes : protected Checks {
     const Manner manner = Manner::any(dice);
     const int number = next_core_++;
     draft.text += " shadow " + std::to_string(number) + " (" + manner.name() + ") " + part.name;
+    const bool is_fresh = dice.once_in(2);
+    if (!is_fresh) shared_->copied.insert(number);
     draft.transaction.shadow(part.name, core(number, static_cast<int>(index), manner),
-                             {.budget_ns = ms_to_ns(1), .is_fresh = true}, std::make_unique<TestShell>());
+                             {.budget_ns = ms_to_ns(1), .is_fresh = is_fresh}, std::make_unique<TestShell>());
   }
 
   /// New parts of one component: a core, on probation or not, an fsm with the same period or another one, a shell.

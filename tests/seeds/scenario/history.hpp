@@ -71,6 +71,8 @@ class History {
   /// Before T the old parts, from T on the new ones; each release on the grid and none twice; no state is lost or taken twice.
   void check(const Shared& shared) {
     took_from_ = shared.took_from;
+    took_count_ = shared.took_count;
+    copied_ = shared.copied;
     hung_ = shared.hung_components;
     for (const Execution& execution : shared.executions) {
       check_state(execution);
@@ -98,14 +100,51 @@ class History {
 
   /// Each core goes on from the state of the core that it took over from.
   void check_state(const Execution& execution) {
+    if (is_copied_before(execution)) {
+      check_copy(execution);
+    } else {
+      check_count(execution);
+    }
+    last_counts_[execution.core] = execution.count;
+    counts_[execution.component].insert(execution.count);
+    if (!execution.is_in_shadow) lived_.insert(execution.core);
+  }
+  /// A candidate gets copies where its shadow begins, and where it is promoted.
+  bool is_copied_before(const Execution& execution) const {
+    if (!copied_.contains(execution.core)) return false;
+    const bool is_promoted = !execution.is_in_shadow && !lived_.contains(execution.core);
+    return is_promoted || !last_counts_.contains(execution.core);
+  }
+  /// The copied state is that of a core of the component; of a promoted candidate that of the core that executed last, unless other
+  /// changes came between.
+  void check_copy(const Execution& execution) {
+    const std::int64_t copied = execution.count - 1;
+    const auto& counts = counts_[execution.component];
+    findings_.expect(copied == 0 || counts.contains(copied), where(execution) + " has the count " +
+                                                                 std::to_string(copied) +
+                                                                 ", which no core of the component had");
+    findings_.count("copies of state");
+    const auto last = last_.find(execution.component);
+    if (execution.is_in_shadow || last == last_.end()) return;
+    const auto swaps = std::ranges::count_if(made_, [&](const Made& made) {
+      return made.component == execution.component && made.aspect == Aspect::core &&
+             made.began_ns <= execution.at_ns && made.ended_ns >= last->second->at_ns;
+    });
+    if (swaps != 1) return;
+    findings_.count("copies of state at a promotion");
+    findings_.expect(copied == last->second->count, where(execution) + " was promoted with the count " +
+                                                        std::to_string(copied) + ", expected " +
+                                                        std::to_string(last->second->count));
+  }
+  void check_count(const Execution& execution) {
     const std::int64_t expected = count_of(execution.core) + 1;
     findings_.expect(execution.count == expected, where(execution) + " knows of " +
                                                       std::to_string(execution.count) +
                                                       " executions, expected " + std::to_string(expected));
-    last_counts_[execution.core] = execution.count;
   }
   std::int64_t count_of(int core) const {
     if (const auto last = last_counts_.find(core); last != last_counts_.end()) return last->second;
+    if (const auto taken = took_count_.find(core); taken != took_count_.end()) return taken->second;
     const auto before = took_from_.find(core);
     return before != took_from_.end() ? count_of(before->second) : 0;
   }
@@ -283,8 +322,12 @@ class History {
   std::vector<Epoch> epochs_;
   std::map<int, Verdict> verdicts_;
   std::map<int, int> took_from_;
-  std::map<int, std::int64_t> last_counts_;  // by core
-  std::map<int, time_ns_t> last_clocks_;     // by component
+  std::map<int, std::int64_t> took_count_;
+  std::set<int> copied_;                          // candidates
+  std::set<int> lived_;                           // cores that have executed in their component
+  std::map<int, std::set<std::int64_t>> counts_;  // by component
+  std::map<int, std::int64_t> last_counts_;       // by core
+  std::map<int, time_ns_t> last_clocks_;          // by component
 };
 
 }  // namespace mauve::testing

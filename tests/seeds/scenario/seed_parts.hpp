@@ -71,15 +71,18 @@ struct Shared {
   bool has_shut_down{false};
   int interventions{0};     // requests that start, stop or change components
   std::set<int> stopped{};  // components that a stop has ended, and that no request has started since
-  std::map<int, std::string> cores{};       // alive
-  std::map<int, int> took_from{};           // whose state each core took over
-  std::map<int, Hang> hung_cores{};         // also those that have returned
-  std::multiset<int> hanging_components{};  // once for each core of theirs that hangs
-  std::set<int> hung_components{};          // also those whose cores have returned
-  std::set<int> bad_guards{};               // components whose guard misbehaved
-  int hanging{0};                           // cores
-  time_ns_t returned_ns{0};                 // when the last core returned
-  time_ns_t returned_excuses_ns{0};         // stalls and slowness before that
+  std::map<int, std::string> cores{};  // alive
+  std::map<int, int> took_from{};      // whose state each core took over
+  std::set<int>
+      copied{};  // candidates that begin, and are promoted, with copies of the state of the live core
+  std::map<int, std::int64_t> took_count{};  // what was taken over from one of them
+  std::map<int, Hang> hung_cores{};          // also those that have returned
+  std::multiset<int> hanging_components{};   // once for each core of theirs that hangs
+  std::set<int> hung_components{};           // also those whose cores have returned
+  std::set<int> bad_guards{};                // components whose guard misbehaved
+  int hanging{0};                            // cores
+  time_ns_t returned_ns{0};                  // when the last core returned
+  time_ns_t returned_excuses_ns{0};          // stalls and slowness before that
   std::vector<Visit> visits{};
   std::multiset<int> configured{};  // components whose hooks a client calls
 };
@@ -134,6 +137,7 @@ class SeedCore : public Core<TestShell> {
     expect(is_in_shadow || !shared_->has_shut_down, "executes after the shutdown");
     expect(is_in_shadow || !shared_->stopped.contains(component_), "executes after a stop");
     is_out_ = false;
+    note_copy();
     shared_->executions.push_back({.component = component_,
                                    .clock_ns = clock_ns(),
                                    .at_ns = seeds::now_ns(),
@@ -186,8 +190,10 @@ class SeedCore : public Core<TestShell> {
     expect(!shared_->took_from.contains(number_), "takes over twice");
     expect(before.number_ == adopted_, "takes over from core " + std::to_string(before.number_) +
                                            ", and has adopted core " + std::to_string(adopted_));
+    before.note_copy();
     count_ = before.count_;
     shared_->took_from[number_] = before.number_;
+    if (shared_->copied.contains(before.number_)) shared_->took_count[number_] = count_;
     before.is_out_ = true;
     before.was_on_call_ = is_on_probation_;
     behave(Hook::take);
@@ -221,6 +227,11 @@ class SeedCore : public Core<TestShell> {
   void expect(bool is_true, const std::string& what) const { expect(is_true, what.c_str()); }
 
   void compute(time_ns_t most_ns) noexcept { seeds::compute(dice_.between(0, most_ns)); }
+  /// The kernel copies the state of a candidate without a call of its hooks.
+  void note_copy() noexcept {
+    if (shared_->copied.contains(number_)) count_ = copied_;
+  }
+
   /// Others that preempt it make it slower.
   template <typename Pass>
   void pass_slowly(time_ns_t length_ns, const Pass& pass) noexcept {

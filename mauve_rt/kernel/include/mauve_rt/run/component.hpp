@@ -115,7 +115,8 @@ class PartsChange final : public CommitAction {
   void set_probation(std::shared_ptr<Probation> probation) noexcept { probation_ = std::move(probation); }
   /// Gives the probation away; nullptr: there is none. [non-rt]
   std::shared_ptr<Probation> release_probation() noexcept { return std::move(probation_); }
-  bool has_probation() const noexcept { return probation_ != nullptr; }
+  /// Of a bumpless change only where the outputs go over. [non-rt]
+  bool has_probation() const noexcept;
   /// The new core is the candidate of the component's shadow. Unless it is `fresh` it gets copies of the old core's state fields. [setup]
   void promote(bool is_fresh) noexcept {
     promotes_ = true;
@@ -127,6 +128,9 @@ class PartsChange final : public CommitAction {
   /// goes on in the wait of the same name; before its first release, and after a fault, the caller starts it anew
   /// (Task::keep_place()). [rt]
   void put_back() MAUVE_RT;
+  /// Before put_back(): ends a blend and takes the old core out of it. Whether the old core can go back in. [rt] as far as the core's
+  /// bind_shell() is, the component's thread
+  bool take_old_core() noexcept;
   /// Whether an fsm is replaced. [rt]
   bool replaces_fsm() const MAUVE_RT { return parts_.fsm != nullptr; }
   /// And it is the fallback. [setup]

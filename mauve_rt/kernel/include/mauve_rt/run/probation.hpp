@@ -44,6 +44,7 @@ struct ProbationOptions {
       false};  // an execution over its bound (max_execution, wcet), without the other faults
   std::vector<OutputLimit> outputs{};
   std::int64_t min_releases{1};  // at least 1; with fewer the verdict is inconclusive
+  bool is_blend{false};  // the old core executes in a blend: the probation ends with it, and no hang reverts
 };
 /// Throws Error (invalid_argument): a duration, a count or a bound makes no sense, whatever the component's ports are. [non-rt]
 void check_options(const ProbationOptions& options, const std::string& component);
@@ -69,7 +70,8 @@ enum class ProbationCause : std::uint8_t {
   replaced,       // inconclusive: another change of the component's parts was taken
   fell_back,  // inconclusive: the new core faulted, which on_fault did not watch, and the fallback core took over
   ended,      // inconclusive: the component was cleaned up or removed, or its host was shut down
-  hung,       // reverted: a state of the new core does not end, and the old core goes on by another thread
+  blend_ended,  // inconclusive: the blend ended before its time
+  hung,         // reverted: a state of the new core does not end, and the old core goes on by another thread
 };
 
 /// One probation as anyone may see it.
@@ -126,6 +128,9 @@ struct ProbationRecord {
 /// properties and connecting ports do not end it: these stay as they are when the old core is put back. A stop does not end it:
 /// the time goes on. Cleaning up, configuring anew, removing the component, and a shutdown of the host end it as inconclusive.
 /// It has precedence over a fallback core, which stays ready for later.
+///
+/// A new core whose outputs go over (blend.hpp) is on probation for faults and requests, as long as the blend lasts. The old core executes
+/// in the blend until it goes back in, with the state that it has by then. A state that does not end is not given up.
 /// A change that was prepared to replace the core before the old one was put back is refused by its adopt, and stale once the
 /// revert was settled.
 ///
@@ -180,6 +185,10 @@ class Probation : public std::enable_shared_from_this<Probation> {
   bool wait_ended(time_ns_t until_ns) const noexcept;
   /// [rt]
   bool has_ended() const MAUVE_RT { return phase() >= kConcluded; }
+  /// Whether it begins and ends with a blend. [rt]
+  bool is_of_blend() const MAUVE_RT { return options_.is_blend; }
+  /// [rt]
+  bool has_begun() const MAUVE_RT { return phase() != kPrepared; }
   bool is_reverted() const MAUVE_RT { return phase() == kReverted; }
   /// Ends it when its time is over. Whether it has ended. [non-rt]
   bool conclude_if_over() noexcept;
@@ -229,7 +238,9 @@ class Probation : public std::enable_shared_from_this<Probation> {
   };
 
   bool is_executing() noexcept;
-  bool reverts_hang() const noexcept { return options_.on_fault || options_.on_overrun; }
+  bool reverts_hang() const noexcept {
+    return !options_.is_blend && (options_.on_fault || options_.on_overrun);
+  }
   Phase phase() const MAUVE_RT { return static_cast<Phase>(phase_.load(std::memory_order_acquire)); }
   bool is_watched() const MAUVE_RT;
   void find(const Found& found) MAUVE_RT;

@@ -62,6 +62,7 @@ enum class ShadowCause : std::uint8_t {
   overrun,     // of the component, in a blend
   stop,        // of the component, in a blend
   live_fault,  // of the new core, in a blend
+  reverted,    // the old core of a blend went back in
 };
 
 /// One shadow as anyone may see it.
@@ -108,7 +109,8 @@ struct ShadowParts {
 ///
 /// After a bumpless change with a blend (blend.hpp) it has the parts the other way round: the old core is in the shadow's shell, and
 /// executes on the component's thread, at the end of each release, on the inputs that the new core has read in that very release. The
-/// blend ends by its time, by an overrun of the component, a fault of either core, a stop, and by all that ends a shadow.
+/// blend ends by its time, by an overrun of the component, a fault of either core, a stop, and by all that ends a shadow. As long as it
+/// lasts the new core is on probation (probation.hpp): after a fault of the new core the old core goes back in.
 ///
 /// | member            | written by                                  | read by                | order                                |
 /// | ----------------- | ------------------------------------------- | ---------------------- | ------------------------------------ |
@@ -117,7 +119,7 @@ struct ShadowParts {
 /// | ended_ns_, cause_ | who ends it                                 | anyone                 | phase_                               |
 /// | capture_          | the component's thread, who executes        | both                   | its own: shadow_capture.hpp          |
 /// | parts_ ... debt_  | who executes, prepares, suspends, retires   | same                   | run_mutex_                           |
-/// | figures_ ... properties_ | who executes, or sets              | anyone but the component's thread | figures_mutex_           |
+/// | figures_ ... set_properties_ | who executes, or sets       | same                   | figures_mutex_                       |
 /// | signal_           | before it begins                            | the component's thread | the commit publishes it              |
 /// | handover_         | [setup]                                     | who begins it          | -                                    |
 /// | steps_            | who makes it wait for near outputs          | who executes, or tells; the component's thread | figures_mutex_; the commit publishes it |
@@ -133,7 +135,7 @@ struct ShadowParts {
 /// | is_settled_       | who settles                                 | same                   | relaxed: one of them retires it      |
 /// | the rest          | [setup]                                     | anyone                 | -                                    |
 ///
-/// The component's thread takes neither mutex, but in virtual time, where there is one thread.
+/// The component's thread waits for neither mutex, but in virtual time, where there is one thread.
 class Shadow {
  public:
   /// A change waits so long for a state of the candidate to end, on a thread that gets little time.
@@ -201,11 +203,15 @@ class Shadow {
   /// Before the wait that ends a release: executes the old core, and returns the time that its states declare in virtual time. [rt] as
   /// far as the states are
   time_ns_t execute_old(time_ns_t instant_ns) noexcept;
-  /// Writes the outputs of this release; the last time, those of the new core. [rt]
-  void write_blended(time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
+  /// Writes the outputs of this release; the last time, those of the new core. Why the blend has ended; none: it lasts. [rt]
+  ShadowCause write_blended(time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
   /// Before its time. The outputs that are held are written: at a stop as they would be at the end of the release, after a fault of the
   /// new core not at all, else those of the new core. [rt]
   void end_blend(ShadowCause why, time_ns_t instant_ns, time_ns_t now_ns) MAUVE_RT;
+
+  /// Ends the blend with the old core: gives the core away, and drops what the new one has written in this release. False: the blend
+  /// has ended before. [rt]
+  bool give_back_old(std::unique_ptr<CoreBase>& to, time_ns_t now_ns) MAUVE_RT;
 
   /// Ends it when a release of the candidate executes for longer than this. [non-rt]
   void conclude_if_hung(time_ns_t longest_ns) noexcept;
@@ -275,7 +281,7 @@ class Shadow {
   }
   bool run_oldest() noexcept MAUVE_REQUIRES(run_mutex_);
   void execute(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
-  void take_properties();
+  void take_properties() noexcept MAUVE_REQUIRES(figures_mutex_);
   void put_inputs();
   bool advance_to(const ShadowCapture::Release& release) MAUVE_REQUIRES(run_mutex_);
   bool is_blending() const MAUVE_RT { return phase_.load(std::memory_order_acquire) == kBlending; }
@@ -330,6 +336,8 @@ class Shadow {
   std::string fault_ MAUVE_GUARDED_BY(figures_mutex_){};
   std::vector<std::pair<std::string, PropertyValue>> properties_
       MAUVE_GUARDED_BY(figures_mutex_){};  // to be set
+  std::vector<std::pair<std::string, PropertyValue>> set_properties_
+      MAUVE_GUARDED_BY(figures_mutex_){};  // the values before; the next caller of set_property() frees them
   std::vector<std::pair<std::size_t, OutputComparison>> comparisons_
       MAUVE_GUARDED_BY(figures_mutex_);  // by the port's place in the shell
 };

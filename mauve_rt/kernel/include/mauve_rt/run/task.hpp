@@ -29,6 +29,7 @@ namespace mauve {
 
 class Probation;
 class Shadow;
+enum class ProbationCause : std::uint8_t;
 enum class ShadowCause : std::uint8_t;
 
 /// Numbered as mauve_msgs/msg/ComponentInfo, whose 3 is no longer used.
@@ -161,7 +162,7 @@ class Task final : public Waiter {
   /// Its core is on probation from now on. [rt], in a take.
   void set_probation(Probation& probation) MAUVE_RT { probation_.set(probation); }
   /// The core is replaced by another one: it is on probation no more. [rt], in a take.
-  void end_probation(bool falls_back) MAUVE_RT;
+  void end_probation(ProbationCause why) MAUVE_RT;
   /// The machine does not refer to the probation any more, which has ended; it may have another by now. [non-rt], the
   /// component claimed.
   void forget_probation(const Probation& probation) noexcept { probation_.revoke(probation, kForever); }
