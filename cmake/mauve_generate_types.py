@@ -266,6 +266,8 @@ class Writer:
         yield from self.service_traits(action.send_goal_service)
         yield from self.service_traits(action.get_result_service)
         yield from self.traits(action.feedback_message)
+        name = action.namespaced_type.namespaced_name()
+        yield f'MAUVE_ACTION_TYPE({cpp_name(name)}, "{"/".join(name)}")'
 
     def write(self, content: Any) -> str:
         """The header, of a parsed .idl file."""
@@ -278,7 +280,11 @@ class Writer:
         declared = list(declare(element, self.interface.name))
         guard = re.sub(r"\W", "_", self.interface.header).upper()
         others = sorted(need.header for need in self.needs - {self.interface})
-        call = ["#include <mauve_rt/data/call_type.hpp>"] if self.interface.kind != "msg" else []
+        described = {
+            "msg": ["cdr"],
+            "srv": ["call_type", "cdr"],
+            "action": ["action_type", "call_type", "cdr"],
+        }
         return "\n".join(
             [
                 f"// Written by mauve_generate_types() from {self.interface}. Change that one.",
@@ -290,8 +296,7 @@ class Writer:
                 "#include <initializer_list>",
                 "#include <string_view>",
                 "",
-                *call,
-                "#include <mauve_rt/data/cdr.hpp>",
+                *(f"#include <mauve_rt/data/{each}.hpp>" for each in described[self.interface.kind]),
                 *(f"#include <{header}>" for header in others),
                 "",
                 f"namespace mauve::msg::{self.interface.package} {{",

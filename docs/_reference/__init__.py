@@ -42,6 +42,7 @@ def parts() -> Mapping[str, Callable[[], str]]:
         "node_parameters": node_parameters.text,
         "messages": messages.messages,
         "services": messages.services,
+        "actions": messages.actions,
         "errors": errors.text,
         "trace_records": traces.records,
         "bag": traces.bag,

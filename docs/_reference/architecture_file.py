@@ -32,6 +32,10 @@ SECTIONS: dict[type[Section], tuple[str, str]] = {
     schema.TopicModel: ("topic", "`topic: {...}` of a resource."),
     schema.QosModel: ("qos", "`qos: PROFILE`, or `qos: {...}` of a topic."),
     schema.ServiceModel: ("service", "`service: {...}` of a resource."),
+    schema.ActionModel: (
+        "action",
+        "`action: {...}` of a resource of kind `action_server` or `action_client`.",
+    ),
 }
 
 
@@ -47,7 +51,11 @@ def text() -> str:
 
 def _kind(name: str) -> str:
     kind = given_kinds()[name]
-    types = {"type": "a ROS message, or a type of a plug-in", "call_type": "a ROS service"}
+    types = {
+        "type": "a ROS message, or a type of a plug-in",
+        "call_type": "a ROS service",
+        "action_type": "a ROS action",
+    }
     says = f"`type` is {types[kind.type_kind]}." if kind.type_kind else "The resource has no value."
     if kind.messages:
         says += " Its topic may carry " + ", ".join(f"`{each}`" for each in kind.messages) + "."

@@ -1,4 +1,4 @@
-"""The messages and services of mauve_msgs, with the comments of their files."""
+"""The messages, services and actions of mauve_msgs, with the comments of their files."""
 
 import re
 from pathlib import Path
@@ -8,6 +8,8 @@ from _reference import ROOT
 from _reference.tables import table
 
 _DECLARED = re.compile(r"^(?P<type>\S+) +(?P<name>\w+)(?: *= *(?P<value>\S+))? *(?:# ?(?P<comment>.*))?$")
+
+_SECTIONS = {".msg": ("",), ".srv": ("Request", "Reply"), ".action": ("Goal", "Result", "Feedback")}
 
 
 class Declared(NamedTuple):
@@ -29,15 +31,20 @@ def services() -> str:
     return "\n".join(f"## {file.stem}\n\n{described(file)}" for file in files("srv"))
 
 
+def actions() -> str:
+    """All actions, by name."""
+    return "\n".join(f"## {file.stem}\n\n{described(file)}" for file in files("action"))
+
+
 def files(kind: str) -> list[Path]:
-    """The files of a kind: msg or srv."""
+    """The files of a kind: msg, srv or action."""
     return sorted((ROOT / "mauve_msgs" / kind).glob(f"*.{kind}"))
 
 
 def described(file: Path) -> str:
-    """What the file says, then its fields; of a service those of the request and of the reply."""
+    """What the file says, then its fields: of a service or an action those of each section."""
     head, sections = parsed(file.read_text(encoding="utf-8"))
-    titles = ("Request", "Reply") if file.suffix == ".srv" else ("",)
+    titles = _SECTIONS[file.suffix]
     parts = [head] if head else []
     for title, fields in zip(titles, sections, strict=True):
         rows = [(f"`{_value(each)}`", f"`{each.type}`", each.comment) for each in fields]

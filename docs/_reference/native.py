@@ -26,7 +26,7 @@ def install() -> None:
     """Put the stubs into sys.modules, where the imports of MAUVE RT find them."""
     if getattr(sys.modules.get("mauve_rt._kernel"), "is_stub", False):
         return
-    messages = _package("mauve_msgs", ("msg", "srv"))
+    messages = _package("mauve_msgs", ("action", "msg", "srv"))
     for file in sorted((ROOT / "mauve_msgs").glob("*/*.*")):
         setattr(getattr(messages, file.parent.name), file.stem, _message_class(file))
     for name in ("_kernel", "_bridge"):

@@ -121,12 +121,8 @@ void bind_resource_kinds(py::module_& module) {
       .def_readonly("name", &ResourceKind::name)
       .def_readonly("parameters", &ResourceKind::parameters)
       .def_property_readonly(
-          "type_kind",
-          [](const ResourceKind& self) {
-            if (self.type == TypeNeed::none) return "";
-            return self.type == TypeNeed::data ? "type" : "call_type";
-          },
-          "Of what its type is: 'type' or 'call_type' of a registry; '': it has none.")
+          "type_kind", [](const ResourceKind& self) { return std::string(to_string(self.type)); },
+          "Of what its type is: 'type', 'call_type' or 'action_type' of a registry; '': it has none.")
       .def_readonly("messages", &ResourceKind::messages,
                     "As which its topic may say it, the last where no type is given.")
       .def_readonly("values", &ResourceKind::values,

@@ -157,13 +157,8 @@ def _resource(name: str, one: ResourceModel, model: ArchitectureModel) -> Any:
     namespace = model.namespace
     frame, child_frame = model.frames_of(one, ("resources", name))
     found = SimpleNamespace(name=name, kind=one.kind, type=one.type, frame=frame, child_frame=child_frame)
-    if one.topic is not None:
-        side = "publishes" if one.topic.direction == "publish" else "subscribes"
-        setattr(found, side, full_name(one.topic.name, namespace))
-    if one.service is not None:
-        setattr(
-            found, "calls" if one.service.offers is None else "offers", full_name(one.service.name, namespace)
-        )
+    for side, ros_name in one.ros_names.items():
+        setattr(found, side, full_name(ros_name, namespace))
     return found
 
 

@@ -22,7 +22,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="*",
         action=_Words,
         metavar="TYPE",
-        help="TYPE: its fields; msg TYPE: the type as a .msg file (default: a list of all types)",
+        help="TYPE: its fields; msg TYPE: the type as a .msg file, an action as an .action file "
+        "(default: a list of all types)",
     )
     parser.add_argument("--json", action="store_true", help="print JSON")
 
@@ -49,16 +50,30 @@ def main(args: argparse.Namespace) -> int:
         rows = [*_all(loader)]
         print_json(rows) if args.json else _print_table(rows)
         return OK
-    loader.require("type", args.type)
-    shape = next(each for each in loader.registry.type_shapes() if each.type == args.type)
+    names = _names(loader, args.type)
+    shapes = {shape.type: shape for shape in loader.registry.type_shapes()}
+    found = [shapes[name] for name in names]
     if args.is_file:
-        print(message_files(shape)[0].text, end="")
+        print("---\n".join(message_files(shape)[0].text for shape in found), end="")
     elif args.json:
-        print_json({**_row(loader, shape), "fields": [*_fields(shape.fields)]})
+        described = [{**_row(loader, shape), "fields": [*_fields(shape.fields)]} for shape in found]
+        print_json(described[0] if args.type in names else described)
     else:
-        print(f"{shape.type}: {shape.bytes:,} bytes")
-        print("\n".join(_lines(shape.fields)))
+        for shape in found:
+            print(f"{shape.type}: {shape.bytes:,} bytes")
+            print("\n".join(_lines(shape.fields)))
     return OK
+
+
+def _names(loader: "PluginLoader", name: str) -> list[str]:
+    """The type of this name, or the parts of an action; they are loaded."""
+    from mauve_rt.parts.message_types import PARTS_OF_ACTIONS  # noqa: PLC0415
+
+    if not loader.has("action_type", name):
+        loader.require("type", name)
+        return [name]
+    loader.require("action_type", name)
+    return [f"{name}_{part}" for part in PARTS_OF_ACTIONS]
 
 
 def _all(loader: "PluginLoader") -> Iterator[dict[str, Any]]:

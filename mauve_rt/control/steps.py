@@ -248,7 +248,7 @@ class Plan:
             if problems := Checks(model, loader).problems():
                 raise ArchitectureFileError(model.path, problems)
             add_resource_step(self.transaction, model, name, loader.registry)
-            if resource.topic is not None or resource.service is not None:
+            if resource.ros_names:
                 self.bound.added[name] = resource
                 self.bound.described[name] = describe_resource(resource, loader.registry)
         self._resources.add(name)

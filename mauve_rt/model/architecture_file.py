@@ -10,7 +10,14 @@ from mauve_rt.errors import ArchitectureFileError, Problem
 from mauve_rt.file_schema.schema_errors import owner, read_content
 from mauve_rt.file_schema.words import did_you_mean, listed
 from mauve_rt.file_schema.yaml_file import Location, YamlFile
-from mauve_rt.model.resource_kinds import given_kinds, given_kinds_with, has_key
+from mauve_rt.model.resource_kinds import (
+    EXAMPLES_OF_TYPES,
+    foreign_bindings,
+    given_kinds,
+    given_kinds_with,
+    has_key,
+    needed_binding,
+)
 from mauve_rt.model.schema import ComponentModel, FileModel, FramesModel, PropertyValue, ResourceModel
 from mauve_rt.model.substitution import substituted_frame, substituted_property
 
@@ -232,23 +239,35 @@ def _resource_problems(model: ArchitectureModel) -> Iterator[Problem]:
             expected = f"{', '.join(kind.messages)}, or none, which is the last"
             yield model.problem((*location, "type"), what, expected=expected, found=resource.type)
         if kind is not None and kind.type_kind and not resource.type:
-            example = "std_srvs/srv/SetBool" if kind.type_kind == "call_type" else "geometry_msgs/msg/Point"
+            example = EXAMPLES_OF_TYPES[kind.type_kind]
             yield model.problem(location, f"resource '{name}' has no type", expected=f"e.g. {example}")
+        yield from _binding_problems(model, name)
         yield from _service_problems(model, name)
+
+
+def _binding_problems(model: ArchitectureModel, name: str) -> Iterator[Problem]:
+    """A client has a service, and a server or client of an action an action; they have nothing else."""
+    resource, location = model.resources[name], ("resources", name)
+    kind = given_kinds().get(resource.kind)
+    needed = needed_binding(kind)
+    who = f"resource '{name}' of kind {resource.kind}"
+    if needed and getattr(resource, needed) is None:
+        yield model.problem(location, f"{who} has no {needed}", expected=f"{needed}: {{name: ...}}")
+    for key in foreign_bindings(kind):
+        if getattr(resource, key) is not None:
+            of_kinds = [each.name for each in given_kinds().values() if needed_binding(each) == key]
+            remedy = (
+                f"bind it by {needed}" if needed else f"only resources of kind {listed(of_kinds)} have one"
+            )
+            yield model.key_problem((*location, key), f"{who} takes no {key}", remedy=remedy)
 
 
 def _service_problems(model: ArchitectureModel, name: str) -> Iterator[Problem]:
     """A client calls a ROS service; any other resource may offer a call of its own as one."""
     resource, location = model.resources[name], ("resources", name)
     service, kind = resource.service, given_kinds().get(resource.kind)
-    is_client = kind is not None and kind.type_kind == "call_type"
-    if is_client and resource.topic is not None:
-        what = f"resource '{name}' of kind {resource.kind} is bound to a topic"
-        yield model.key_problem((*location, "topic"), what, remedy=f"a {resource.kind} calls a service")
-    if service is None:
-        if is_client:
-            what = f"resource '{name}' of kind {resource.kind} calls no service"
-            yield model.problem(location, what, expected="service: {name: ...}")
+    is_client = needed_binding(kind) == "service"
+    if service is None or "service" in foreign_bindings(kind):
         return
     at = (*location, "service")
     if is_client and service.offers is not None:

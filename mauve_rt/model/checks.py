@@ -18,10 +18,10 @@ from mauve_rt.file_schema.yaml_file import Location
 from mauve_rt.model.architecture_file import ArchitectureModel, Connection
 from mauve_rt.model.message_shapes import REMEDY, message_definition, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
-from mauve_rt.model.resource_kinds import capacities, given_kinds, read_parameters
+from mauve_rt.model.resource_kinds import EXAMPLES_OF_TYPES, capacities, given_kinds, read_parameters
 from mauve_rt.model.resource_parts import describe_resource
 from mauve_rt.model.schema import PropertyValue, ResourceModel
-from mauve_rt.parts.message_types import is_message, service_class
+from mauve_rt.parts.message_types import action_class, is_message, service_class
 
 
 class Checks:
@@ -241,13 +241,14 @@ class Checks:
             what = (
                 f"resource '{name}' is bound to topic '{resource.topic.name}', but its type is no ROS message"
             )
-            expected = "an installed message type such as geometry_msgs/msg/Point"
+            expected = f"an installed message type such as {EXAMPLES_OF_TYPES['type']}"
             found = shown(self._resources[name].type)
             yield self._model.key_problem((*place, "topic"), what, expected=expected, found=found)
         at = (*place, "type" if resource.type else "kind")
         yield from self._structs(self._resources[name].services, at)
         yield from self._capacities(name)
         yield from self._service(name)
+        yield from self._action(name)
 
     def _parameters(self, resource: ResourceModel, place: Location) -> list[Problem]:
         """What is wrong with the parameters of a plug-in's kind; of a given one's the file told."""
@@ -299,8 +300,17 @@ class Checks:
             service_type = offered.type
         if service_class(service_type) is None:
             what = f"resource '{name}' is bound to service '{service.name}', but its type is no ROS service"
-            expected = "an installed service type such as std_srvs/srv/SetBool"
+            expected = f"an installed service type such as {EXAMPLES_OF_TYPES['call_type']}"
             yield self._model.key_problem(place, what, expected=expected, found=shown(service_type))
+
+    def _action(self, name: str) -> Iterator[Problem]:
+        """The ROS action that a resource uses or offers."""
+        resource = self._model.resources[name]
+        if resource.action is not None and action_class(resource.type) is None:
+            what = f"resource '{name}' has action '{resource.action.name}', but its type is no ROS action"
+            expected = f"an installed action type such as {EXAMPLES_OF_TYPES['action_type']}"
+            place = ("resources", name, "action")
+            yield self._model.key_problem(place, what, expected=expected, found=shown(resource.type))
 
     def _connection(self, connection: Connection) -> Iterator[Problem]:
         shell = self._shells.get(connection.component)

@@ -33,10 +33,11 @@ KINDS: Mapping[str, str] = {
     "resource": "a kind of resource",
     "type": "a type of values of resources, such as a ROS message",
     "call_type": "a type of calls, such as a ROS service",
+    "action_type": "a type of actions, such as a ROS action",
 }
 IN_PYTHON = ("shell", "core", "fsm", "resource")
 """Kinds that a Python class can be; types are written in C++, or are ROS messages, which nothing lists."""
-_TYPES = ("type", "call_type")  # several packages may register the same one
+_TYPES = tuple(kind for kind in KINDS if kind.endswith("type"))  # several packages may register the same one
 SOURCE_IT = "source its install/setup.bash, or add its prefix to AMENT_PREFIX_PATH"
 _FIELDS = 4
 
@@ -308,7 +309,7 @@ class PluginLoader:
         return f"package {shown(package)} is not found"
 
     def require_type(self, name: str, kind: str = "type") -> None:
-        """As require(), but leaves a type (or call_type) that nothing lists to the registry's own words."""
+        """As require(), but leaves a type of data, calls or actions that nothing lists to the registry."""
         if self.index.find(kind, name) is not None:
             self.require(kind, name)
 

@@ -20,6 +20,7 @@ from mauve_rt.errors import MauveError
 from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.modelling.durations import duration_text
 from mauve_rt.modelling.schema import ModelFile
+from mauve_rt.modelling.type_names import action_of
 from mauve_rt.parts.model_core import ModelCore
 from mauve_rt.parts.part import Configurable
 
@@ -72,7 +73,8 @@ class _Reading:
             for name in of_kind:
                 self._loader.require(kind, name)
         for name in names["type"]:
-            self._type(name)
+            if not action_of(name):
+                self._type(name)
         shells = {_last(name): self._shell(name) for name in names["shell"]}
         cores: Mapped = {}
         fsms = {_last(name): self._fsm(name, names["core"], cores) for name in names["fsm"]}
@@ -119,8 +121,8 @@ class _Reading:
         return item if package == self._package else f"{package}/msg/{item}"
 
     def _own(self, name: str) -> str:
-        """A name without the package, of another package with it."""
-        return _last(name) if name.partition("/")[0] == self._package else name
+        """A name without the package; with it that of another package, and of a part of an action."""
+        return name if name.partition("/")[0] != self._package or action_of(name) else _last(name)
 
     def _shell(self, name: str) -> Mapped:
         shell = self._registry.describe_shell(name)

@@ -97,7 +97,7 @@ class Subject:
             users = [link.component for link in links if services[link.service] == kind]
             if resource.topic is not None and resource.topic.direction == direction:
                 users.append(f"topic {resource.topic.name}")
-            if resource.service is not None or name in self.uses.connected():
+            if resource.service is not None or resource.action is not None or name in self.uses.connected():
                 users.append(_ELSEWHERE)
             found[name] = users
         return found

@@ -13,6 +13,12 @@ from mauve_rt.file_schema.yaml_file import Location
 _INT64 = 2**63
 _CAPACITY = "capacity"  # with a field behind a point, or as a mapping by fields: of sequences of the type
 _SEQUENCE = Whole(1, 1_000_000_000)
+EXAMPLES_OF_TYPES: Mapping[str, str] = {
+    "type": "geometry_msgs/msg/Point",
+    "call_type": "std_srvs/srv/SetBool",
+    "action_type": "mauve_msgs/action/DriveTo",
+}
+"""A ROS type for each kind of types of resources."""
 
 
 @cache
@@ -34,6 +40,19 @@ def has_key(kind: ResourceKind, key: str) -> bool:
 def given_kinds_with(key: str) -> tuple[str, ...]:
     """The given kinds that have a key."""
     return tuple(name for name, kind in given_kinds().items() if has_key(kind, key))
+
+
+def needed_binding(kind: ResourceKind | None) -> str:
+    """The key of a file without which a resource of the kind has no use: service or action; empty: none."""
+    return {"call_type": "service", "action_type": "action"}.get(kind.type_kind, "") if kind else ""
+
+
+def foreign_bindings(kind: ResourceKind | None) -> tuple[str, ...]:
+    """Those of topic, service and action that a resource of the kind, or of a plug-in's, does not have."""
+    needed = needed_binding(kind)
+    return tuple(
+        key for key in ("topic", "service", "action") if key != needed and (needed or key == "action")
+    )
 
 
 def read_parameters(
@@ -86,17 +105,16 @@ def resource_schema(kind: ResourceKind, *, others: Iterable[str]) -> JsonSchema:
     elif kind.messages:
         keys["type"] = {"enum": ["", *kind.messages]}
     keys["service"] = service_schema(kind)
-    if is_client := kind.type_kind == "call_type":
-        keys["topic"] = {"type": "null"}
+    keys |= {key: {"type": "null"} for key in foreign_bindings(kind)}
     needed = [each.name for each in own if each.required]
     needed += ["type"] if kind.type_kind else []
-    needed += ["service"] if is_client else []
+    needed += [needed_binding(kind)] if needed_binding(kind) else []
     return {"properties": keys, "required": needed, "additionalProperties": False, **patterns}
 
 
 def service_schema(kind: ResourceKind | None) -> JsonSchema:
     """What a kind, or that of a plug-in, adds to the schema of its service."""
-    is_client = kind is not None and kind.type_kind == "call_type"
+    is_client = needed_binding(kind) == "service"
     has_timeout = kind is not None and has_key(kind, "service.timeout_ms")
     rules = [{"not": given("offers")} if is_client else given("offers")]
     rules += [] if has_timeout else [{"properties": {"timeout_ms": False}}]

@@ -16,8 +16,11 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
     from mauve_rt.parts.resources import DataOfKind  # noqa: PLC0415 - it needs the model itself
 
     kind, name, parameters = resource.kind, resource.type, {**resource.parameters}
-    if resource.service is not None and resource.service.timeout_ms is not None:
-        parameters["timeout_ns"] = round(resource.service.timeout_ms * 1e6)
+    for parameter in registry.resource_kind(kind).parameters:
+        section, _, key = parameter.file_key.rpartition(".")
+        of_section = getattr(getattr(resource, section, None), key, None) if section else None
+        if of_section is not None:
+            parameters[parameter.name] = round(of_section * 1e6)  # service.timeout_ms, action.answer_ms
     can_be_serialized = has_key(registry.resource_kind(kind), "max_bytes")
     if can_be_serialized and name not in registry.names("type") and is_message(name):
         return {"resource": DataOfKind(kind, name, **parameters)}

@@ -10,6 +10,7 @@
     resources:
       target: {kind: shared_data, type: geometry_msgs/msg/Point, topic: {name: target, direction: publish}}
       lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: lamp, timeout_ms: 20}}
+      drive: {kind: action_server, type: mauve_msgs/action/DriveTo, action: {name: drive_to, answer_ms: 100}}
       map: {kind: mauve_examples/Map, service: {name: map/clear, offers: clear}}
       wanted: {kind: shared_data, type: geometry_msgs/msg/Twist,
                topic: {name: cmd_vel, direction: subscribe, qos: {profile: sensor_data, depth: 1}}}
@@ -385,18 +386,35 @@ class ServiceModel(Section):
     )
 
 
+class ActionModel(Section):
+    """The ROS action that an action_server offers, or an action_client uses; names as TopicModel."""
+
+    name: str = setting(ROS_NAME, "name of the action, relative to the namespace of the executor")
+    answer_ms: float | None = setting(
+        Real(above=0, most=_LONGEST_MS),
+        "of a server: a goal without the answer of a component is rejected after this time; of a client: the "
+        "longest time for an answer of the server",
+        default=None,
+    )
+
+
 class ResourceModel(Section):
     """Data that components share. What else it is told is of its kind, which says what that may be."""
 
     kind: str = setting(_RESOURCE_KIND, "kind of the resource: a given kind, or a plug-in")
     type: str = setting(
-        Text(), "type of the values: a ROS message, a ROS service, or a type of a plug-in", default=""
+        Text(),
+        "type of the values: a ROS message, a ROS service, a ROS action, or a type of a plug-in",
+        default="",
     )
     topic: TopicModel | None = setting(
         Part(TopicModel), "the ROS topic that carries the values", default=None
     )
     service: ServiceModel | None = setting(
         Part(ServiceModel), "the ROS service that the resource calls or offers", default=None
+    )
+    action: ActionModel | None = setting(
+        Part(ActionModel), "the ROS action that the resource uses or offers", default=None
     )
     frame: str | None = setting(
         FRAME_OF_ROBOT,
@@ -441,6 +459,18 @@ class ResourceModel(Section):
         return TopicModel(name=name, direction=self.topic.direction, qos=qos)
 
     @property
+    def ros_names(self) -> dict[str, str]:
+        """The names of its topic, service or action as the file has them, by fields of ResourceInfo."""
+        names = {}
+        if self.topic is not None:
+            names["publishes" if self.topic.direction == "publish" else "subscribes"] = self.topic.name
+        if self.service is not None:
+            names["offers" if self.service.offers else "calls"] = self.service.name
+        if self.action is not None:
+            names["offers" if self.kind == "action_server" else "calls"] = self.action.name
+        return names
+
+    @property
     def topic_type(self) -> str:
         """The message type of its topic."""
         kind = given_kinds().get(self.kind)
@@ -469,7 +499,8 @@ class ResourceModel(Section):
             definitions[f"{name} resource"] = resource_schema(kind, others=cls.settings)
         kinds = [when(has("kind", name), reference(f"{name} resource")) for name in given_kinds()]
         of_plugin = {"properties": {"kind": {"pattern": "/"}}}
-        kinds.append(when(of_plugin, {"properties": {"service": service_schema(None)}}))
+        keys = {"service": service_schema(None), "action": {"type": "null"}}
+        kinds.append(when(of_plugin, {"properties": keys}))
         return {**schema, "allOf": kinds}
 
 

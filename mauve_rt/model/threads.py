@@ -79,11 +79,8 @@ def uses_of(model: ArchitectureModel) -> dict[str, set[str]]:
     """How threads that are no components use each resource, in the words of mauve_msgs/msg/ResourceInfo."""
     uses: dict[str, set[str]] = {}
     for name, resource in model.resources.items():
-        if resource.topic is not None:
-            side = "publishes" if resource.topic.direction == "publish" else "subscribes"
-            uses.setdefault(name, set()).add(side)
-        if resource.service is not None:
-            uses.setdefault(name, set()).add("offers" if resource.service.offers else "calls")
+        if resource.ros_names:
+            uses.setdefault(name, set()).update(resource.ros_names)
     for mirrored in model.mirrors:
         uses.setdefault(mirrored.name, set()).add("mirrors")
     for name in model.recorded:

@@ -12,7 +12,8 @@ from mauve_rt.modelling.durations import NS_OF, Duration
 from mauve_rt.modelling.keywords import languages_of_keyword
 from mauve_rt.modelling.schema import CoreModel, CppType, FsmModel, ModelFile, ShellModel, StateModel
 from mauve_rt.modelling.scope import Scope
-from mauve_rt.modelling.type_names import NUMBERS, TypeName
+from mauve_rt.modelling.type_names import NUMBERS, TypeName, action_of
+from mauve_rt.parts.message_types import PARTS_OF_ACTIONS
 
 _RESERVED_OF_SHELLS = frozenset(
     """
@@ -113,6 +114,9 @@ class _Checks:
                     what = f"a message has no field of '{of.item}', a struct that exists in C++"
                     remedy = f"write {existing.name}" if "/msg/" in existing.name else "name its fields here"
                     yield self._file.problem(("types", name, field), what, remedy=remedy)
+                if action_of(of.item):
+                    what = f"a message has no field of '{of.item}', a message of an action"
+                    yield self._file.problem(("types", name, field), what, remedy="name its fields here")
             if name in self._within(name):
                 what = f"type '{name}' is within itself"
                 yield self._file.key_problem(("types", name), what, remedy="break the cycle")
@@ -137,6 +141,10 @@ class _Checks:
             what = f"unknown type '{of.item}'"
             expected = "a type of the model, or a message such as geometry_msgs/msg/Point"
             yield self._file.problem(place, what, expected=expected, remedy=remedy, code="unknown_type")
+        elif "/action/" in of.item and not action_of(of.item):
+            what = f"an action is no type of values, found '{of.item}'"
+            expected = listed([f"{of.item}_{part}" for part in PARTS_OF_ACTIONS])
+            yield self._file.problem(place, what, expected=expected)
         elif is_port and (of.is_list or of.length is not None):
             what = f"a port has values of one type, found '{of.text}'"
             yield self._file.problem(place, what, remedy="make a type with a list in it")

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from mauve_rt.modelling.durations import Duration
 from mauve_rt.modelling.package_model import PackageModel
 from mauve_rt.modelling.schema import CppCall, CppType, PortModel, PropertyModel
-from mauve_rt.modelling.type_names import NUMBERS, TypeName
+from mauve_rt.modelling.type_names import NUMBERS, TypeName, action_of
 
 _INT64_MIN = -(2**63)
 
@@ -49,7 +49,7 @@ class CppNames:
             return known.cpp
         if known is not None and not of.is_of_model:
             return of.item
-        return f"mauve::msg::{self._model.registered_type(of.item).replace('/msg/', '::')}"
+        return struct(self._model.registered_type(of.item))
 
     def header(self, of: TypeName) -> Iterator[str]:
         """The header of a type; none of a number or text."""
@@ -59,7 +59,8 @@ class CppNames:
         elif known is not None and not of.is_of_model:
             yield f"{self._model.package}/model/types.hpp"
         elif of.item != "string" and of.item not in NUMBERS:
-            yield interface_header(self._model.registered_type(of.item))
+            name = self._model.registered_type(of.item)
+            yield interface_header(action_of(name) or name)
 
     def part(self, name: str) -> str:
         """The class of a shell or of an abstract core."""
@@ -95,7 +96,7 @@ class CppNames:
         if isinstance(call, CppCall):
             words = f"{text(name)}, {text(call.name)}"
             return f"mauve::CallPort<{call.cpp}>& {name} = call_port<{call.cpp}>({words})"
-        of = service(call)
+        of = struct(call)
         return f"mauve::CallPort<mauve::CallOf<{of}>>& {name} = call_port<{of}>({text(name)})"
 
     def shell_headers(self, ports: Mapping[str, PortModel]) -> list[str]:
@@ -111,9 +112,12 @@ class CppNames:
         return sorted(found)
 
 
-def service(name: str) -> str:
-    """The struct of a service."""
-    return f"mauve::msg::{name.replace('/srv/', '::')}"
+def struct(name: str) -> str:
+    """The struct of an interface, or of a part of an action."""
+    if action := action_of(name):
+        return f"{struct(action)}::{name.removeprefix(f'{action}_')}"
+    package, _, interface = name.split("/")
+    return f"mauve::msg::{package}::{interface}"
 
 
 def interface_header(name: str) -> str:

@@ -1,7 +1,12 @@
-"""Types as a model writes them: `float64`, `Point2D[<=64]`, `string<=32`, `geometry_msgs/msg/Point`."""
+"""Types as a model writes them: `float64`, `Point2D[<=64]`, `string<=32`, `geometry_msgs/msg/Point`.
+
+A port may have a message of an action as well, `mauve_msgs/action/DriveTo_Goal`.
+"""
 
 import re
 from dataclasses import dataclass
+
+from mauve_rt.parts.message_types import PARTS_OF_ACTIONS
 
 NUMBERS = {
     "bool": "bool",
@@ -52,6 +57,12 @@ class TypeName:
     def is_bounded(self) -> bool:
         """Whether its size has a limit."""
         return (self.item != "string" or bool(self.length)) and (not self.is_list or bool(self.count))
+
+
+def action_of(item: str) -> str:
+    """The action of a type such as `mauve_msgs/action/DriveTo_Goal`; empty: the type is no part of one."""
+    action, _, part = item.rpartition("_")
+    return action if part in PARTS_OF_ACTIONS and "/action/" in action else ""
 
 
 def parse_type(text: str) -> TypeName | None:

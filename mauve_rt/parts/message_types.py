@@ -1,4 +1,4 @@
-"""ROS message and service classes by the names that architecture files and requests use.
+"""ROS message, service and action classes by the names that architecture files and requests use.
 
 A name is looked up in the ament index before anything is imported, and imported only from a prefix that lists
 it: no name, whoever sent it, makes a process load another module that happens to be installed.
@@ -14,7 +14,8 @@ from typing import Any
 from mauve_rt.parts import ament_index
 
 INDEX_RESOURCE = "rosidl_interfaces"
-
+PARTS_OF_ACTIONS = ("Goal", "Result", "Feedback")
+"""The messages of an action; the name of one is `package/action/Name_Goal`."""
 
 _PROMISED: set[str] = set()
 
@@ -35,7 +36,13 @@ def is_message(name: str) -> bool:
 
 
 def message_class(name: str) -> Any:
-    """The Python class of `package/msg/Name`; None when it is no installed ROS message."""
+    """The Python class of `package/msg/Name`, or of `package/action/Name_Goal`, `_Result` and `_Feedback`.
+
+    None when it is no installed ROS message.
+    """
+    action, _, part = name.rpartition("_")
+    if part in PARTS_OF_ACTIONS:
+        return getattr(action_class(action), part, None)
     found = _interface(name, "msg")
     return found if hasattr(found, "get_fields_and_field_types") else None
 
@@ -44,6 +51,12 @@ def service_class(name: str) -> Any:
     """The Python class of `package/srv/Name`; None when it is no installed ROS service."""
     found = _interface(name, "srv")
     return found if hasattr(found, "Request") and hasattr(found, "Response") else None
+
+
+def action_class(name: str) -> Any:
+    """The Python class of `package/action/Name`; None when it is no installed ROS action."""
+    found = _interface(name, "action")
+    return found if all(hasattr(found, part) for part in PARTS_OF_ACTIONS) else None
 
 
 def _interface(name: str, kind: str) -> Any:

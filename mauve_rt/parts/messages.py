@@ -22,7 +22,9 @@ _EMPTY = b"\0\1\0\0"  # CDR's header alone
 
 
 def type_name(type_or_name: Any) -> str:
-    """`geometry_msgs/msg/Point` of that class; a name is returned as it is.
+    """`geometry_msgs/msg/Point` of that class, `mauve_msgs/action/DriveTo_Goal` of DriveTo.Goal.
+
+    A name is returned as it is.
 
     Raises:
         TypeError: neither a name nor a class of ROS messages.
@@ -31,8 +33,9 @@ def type_name(type_or_name: Any) -> str:
         return type_or_name
     if not isinstance(type_or_name, type) or not hasattr(type_or_name, "get_fields_and_field_types"):
         raise TypeError(f"expected a class of ROS messages or a type's name, found {type_or_name!r}")
-    package = type_or_name.__module__.partition(".")[0]
-    return f"{package}/msg/{type_or_name.__name__}"
+    package, _, module = type_or_name.__module__.partition(".")
+    folder = "action" if module.startswith("action.") else "msg"
+    return f"{package}/{folder}/{type_or_name.__name__}"
 
 
 def service_name(service: Any) -> str:

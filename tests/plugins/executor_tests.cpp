@@ -132,6 +132,34 @@ struct Stop {
   };
 };
 
+struct PoseStamped {
+  JointState::Header header;
+  struct Pose {
+    Point position;
+    struct Quaternion {
+      double x{};
+      double y{};
+      double z{};
+      double w{1};
+    } orientation;
+  } pose;
+};
+
+struct DriveTo {
+  struct Goal {
+    PoseStamped pose;
+    double tolerance_m{};
+  };
+  struct Result {
+    double distance_m{};
+    bool reached{};
+  };
+  struct Feedback {
+    double distance_m{};
+    double elapsed_s{};
+  };
+};
+
 struct Trigger {
   struct Request {};
   struct Response {
@@ -154,6 +182,13 @@ MAUVE_TYPE(executor_tests::Owning, "executor_tests/Owning", value)
 MAUVE_TYPE(executor_tests::SetBool::Request, "std_srvs/srv/SetBool_Request", data)
 MAUVE_TYPE(executor_tests::SetBool::Response, "std_srvs/srv/SetBool_Response", success, message)
 MAUVE_CALL_TYPE(executor_tests::SetBool, "std_srvs/srv/SetBool")
+MAUVE_TYPE(executor_tests::PoseStamped::Pose::Quaternion, "geometry_msgs/msg/Quaternion", x, y, z, w)
+MAUVE_TYPE(executor_tests::PoseStamped::Pose, "geometry_msgs/msg/Pose", position, orientation)
+MAUVE_TYPE(executor_tests::PoseStamped, "geometry_msgs/msg/PoseStamped", header, pose)
+MAUVE_TYPE(executor_tests::DriveTo::Goal, "mauve_msgs/action/DriveTo_Goal", pose, tolerance_m)
+MAUVE_TYPE(executor_tests::DriveTo::Result, "mauve_msgs/action/DriveTo_Result", distance_m, reached)
+MAUVE_TYPE(executor_tests::DriveTo::Feedback, "mauve_msgs/action/DriveTo_Feedback", distance_m, elapsed_s)
+MAUVE_ACTION_TYPE(executor_tests::DriveTo, "mauve_msgs/action/DriveTo")
 MAUVE_TYPE(executor_tests::Stop::Request, "mauve_msgs/srv/Stop_Request", request_id, expected_revision,
            requested_by, cause, component, timeout_s, force)
 MAUVE_TYPE(executor_tests::OutputStep, "mauve_msgs/msg/OutputStep", output, greatest, difference, least,
@@ -583,6 +618,85 @@ struct CallerFsm : mauve::Fsm<CallerShell, Caller> {
   }
 };
 
+/// Drives along x by 1 m in each release, and says how far it is.
+struct DriverShell : mauve::Shell {
+  mauve::Property<std::int64_t>& period_ms = property("period_ms", 10, {.structural = mauve::ReadBy::fsm});
+  mauve::ActionServerPorts<DriveTo> drive = action_server<DriveTo>("drive");
+};
+struct Driver : mauve::Core<DriverShell> {
+  MAUVE_STATE(goal, driven)
+
+ public:
+  std::uint32_t goal{0};
+  double driven{0.0};
+
+  void act() {
+    auto& drive = shell().drive;
+    const mauve::ActionGoal status = drive.status.read().value;
+    if (status.number == 0) return;
+    if (status.number != goal) {
+      goal = status.number;
+      driven = 0.0;
+    }
+    const double left = drive.goal.read().value.pose.pose.position.x - driven;
+    if (status.its_state() == mauve::GoalState::canceling) {
+      drive.cancel({.distance_m = left, .reached = false});
+    } else if (left < 0.0) {
+      drive.abort({.distance_m = left, .reached = false});
+    } else if (left == 0.0) {
+      drive.succeed({.distance_m = 0.0, .reached = true});
+    } else {
+      driven += 1.0;
+      drive.feedback.write({.distance_m = left - 1.0, .elapsed_s = driven});
+    }
+  }
+};
+/// Does not look at its goals.
+struct Asleep : mauve::Core<DriverShell> {
+  void act() {}
+};
+template <typename CoreType>
+struct DriverFsmOf : mauve::Fsm<DriverShell, CoreType> {
+  void define() override {
+    mauve::State& run = this->execution("Drive", "act", &CoreType::act);
+    mauve::State& pause = this->wait("Pause", mauve::ms_to_ns(this->shell().period_ms.value()));
+    this->set_initial(run);
+    this->next(run, pause);
+    this->next(pause, run);
+  }
+};
+
+/// Sends the goals that it reads, one after another; says its number and state.
+struct PassengerShell : mauve::Shell {
+  mauve::ReadPort<Number>& wish = read_port<Number>("wish");
+  mauve::ActionClientPorts<DriveTo> drive = action_client<DriveTo>("drive");
+  mauve::WritePort<Number>& said = write_port<Number>("said");
+};
+struct Passenger : mauve::Core<PassengerShell> {
+  void act() {
+    auto& drive = shell().drive;
+    const auto wish = shell().wish.read();
+    if (wish.is_new() && wish.value.data >= 0.0) {
+      DriveTo::Goal goal;
+      goal.pose.pose.position.x = wish.value.data;
+      drive.send(goal);
+    } else if (wish.is_new()) {
+      drive.cancel();
+    }
+    const mauve::ActionGoal status = drive.status.read().value;
+    shell().said.write({status.number * 1000.0 + status.state * 100.0 + status.reason});
+  }
+};
+struct PassengerFsm : mauve::Fsm<PassengerShell, Passenger> {
+  void define() override {
+    mauve::State& run = execution("Look", "act", &Passenger::act);
+    mauve::State& pause = wait("Pause", mauve::ms_to_ns(10));
+    set_initial(run);
+    next(run, pause);
+    next(pause, run);
+  }
+};
+
 /// Asks for the stop of a component whose name is no text; says the reply's code.
 struct StopperShell : mauve::Shell {
   mauve::CallPort<mauve::CallOf<Stop>>& stop = call_port<Stop>("stop");
@@ -808,6 +922,17 @@ MAUVE_PLUGINS(registry) {
   registry.fsm<EventFsm>("executor_tests/EventFsm", shell);
   registry.call_type<SetBool>();
   registry.call_type<Stop>();
+  registry.action_type<DriveTo>();
+  const std::string driver = "executor_tests/DriverShell";
+  registry.shell<DriverShell>(driver);
+  registry.core<Driver>("executor_tests/Driver", driver);
+  registry.core<Asleep>("executor_tests/Asleep", driver);
+  registry.fsm<DriverFsmOf<Driver>>("executor_tests/DriverFsm", driver);
+  registry.fsm<DriverFsmOf<Asleep>>("executor_tests/AsleepFsm", driver);
+  const std::string passenger = "executor_tests/PassengerShell";
+  registry.shell<PassengerShell>(passenger);
+  registry.core<Passenger>("executor_tests/Passenger", passenger);
+  registry.fsm<PassengerFsm>("executor_tests/PassengerFsm", passenger);
   const std::string stopper = "executor_tests/StopperShell";
   registry.shell<StopperShell>(stopper);
   registry.core<Stopper>("executor_tests/Stopper", stopper);

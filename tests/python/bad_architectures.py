@@ -266,7 +266,7 @@ BAD = {
         "kind: ring_buffer",
         "kind: ringbuffer",
         "ringbuffer",
-        "expected shared_data, ring_buffer, latest_value, event, client, transform_tree or",
+        "ring_buffer, latest_value, event, client, action_server, action_client, transform_tree or the name",
     ),
     "ring without capacity": (
         ", capacity: 4",
@@ -369,7 +369,7 @@ BAD = {
         "  queue:",
         "  lamp: {kind: client, type: std_srvs/srv/SetBool}\n  queue:",
         "lamp: {",
-        "resource 'lamp' of kind client calls no service: expected service: {name: ...}",
+        "resource 'lamp' of kind client has no service: expected service: {name: ...}",
     ),
     "client without a type": (
         "  queue:",
@@ -408,7 +408,91 @@ BAD = {
             "topic: {name: x, direction: publish},\n         service: {name: x}}\n  queue:"
         ),
         "topic: {",
-        "resource 'lamp' of kind client is bound to a topic",
+        "resource 'lamp' of kind client takes no topic; bind it by service",
+    ),
+    "client with an action": (
+        "  queue:",
+        (
+            "  lamp: {kind: client, type: std_srvs/srv/SetBool, service: {name: x},\n"
+            "         action: {name: x}}\n  queue:"
+        ),
+        "action: {",
+        "resource 'lamp' of kind client takes no action; bind it by service",
+    ),
+    "server without an action": (
+        "  queue:",
+        "  drive: {kind: action_server, type: mauve_msgs/action/DriveTo}\n  queue:",
+        "drive: {",
+        "resource 'drive' of kind action_server has no action: expected action: {name: ...}",
+    ),
+    "server without a type": (
+        "  queue:",
+        "  drive: {kind: action_server, action: {name: x}}\n  queue:",
+        "drive: {",
+        "resource 'drive' has no type: expected e.g. mauve_msgs/action/DriveTo",
+    ),
+    "server of no registered type": (
+        "  queue:",
+        "  drive: {kind: action_server, type: mauve_msgs/action/DriveT, action: {name: x}}\n  queue:",
+        "mauve_msgs/action/DriveT",
+        "did you mean mauve_msgs/action/DriveTo?",
+    ),
+    "server with a topic": (
+        "  queue:",
+        (
+            "  drive: {kind: action_server, type: mauve_msgs/action/DriveTo,\n         "
+            "action: {name: x}, topic: {name: y, direction: publish}}\n  queue:"
+        ),
+        "topic: {name: y",
+        "resource 'drive' of kind action_server takes no topic; bind it by action",
+    ),
+    "client of an action with a service": (
+        "  queue:",
+        (
+            "  dock: {kind: action_client, type: mauve_msgs/action/DriveTo,\n         "
+            "action: {name: x}, service: {name: y}}\n  queue:"
+        ),
+        "service: {name: y",
+        "resource 'dock' of kind action_client takes no service; bind it by action",
+    ),
+    "time for an answer": (
+        "  queue:",
+        (
+            "  drive: {kind: action_server, type: mauve_msgs/action/DriveTo, "
+            "action: {name: x, answer_ms: 0}}\n  queue:"
+        ),
+        "0}",
+        "found 0",
+    ),
+    "goals": (
+        "  queue:",
+        (
+            "  drive: {kind: action_server, type: mauve_msgs/action/DriveTo, "
+            "action: {name: x}, goals: 0}\n  queue:"
+        ),
+        "0}",
+        "bad goals of resource 'drive'",
+    ),
+    "name of an action": (
+        "  queue:",
+        "  drive: {kind: action_server, type: mauve_msgs/action/DriveTo, action: {name: x y}}\n  queue:",
+        "x y",
+        "bad name",
+    ),
+    "key of an action": (
+        "  queue:",
+        (
+            "  drive: {kind: action_server, type: mauve_msgs/action/DriveTo, "
+            "action: {name: x, answer_s: 1}}\n  queue:"
+        ),
+        "answer_s",
+        "did you mean answer_ms?",
+    ),
+    "action of data": (
+        "  queue:",
+        "  lamp: {kind: executor_tests/Lamp, action: {name: x}}\n  queue:",
+        "action: {",
+        "resource 'lamp' of kind executor_tests/Lamp takes no action; only resources of kind",
     ),
     "service of nothing": (
         "  queue:",

@@ -8,6 +8,7 @@
 
 #include "mauve_rt/base/contract.hpp"
 #include "mauve_rt/base/seam/atomic.hpp"
+#include "mauve_rt/data/action_server.hpp"
 #include "mauve_rt/data/client.hpp"
 #include "mauve_rt/data/resource.hpp"
 
@@ -60,9 +61,18 @@ struct CallReport {
   CallCounts counts;
 };
 
+/// What is known of a ROS action that a resource serves, or whose server it calls.
+struct ActionReport {
+  std::string resource;
+  std::string action;  // expanded and remapped
+  bool is_offered;
+  ActionCounts counts;
+};
+
 struct BridgeReport {
   std::vector<TopicReport> topics;
   std::vector<CallReport> calls;
+  std::vector<ActionReport> actions;
 };
 
 /// Which receiver's thread takes what arrives: calls wait for nobody's messages, nor the other way round.
@@ -97,6 +107,8 @@ class Binding {
   virtual time_ns_t send_stops(bool /*may_wait*/) { return kForever; }
   /// When the sending thread is to call send() at the latest, though nothing was written. [non-rt]
   virtual time_ns_t next_look_ns() const { return kForever; }
+  /// It carries nothing from now on but what it sends; what waits for the outside ends. [non-rt]
+  virtual void end() {}
   /// What its receivers wait for. [non-rt]
   virtual std::vector<Arrival*> arrivals(Lane /*lane*/) { return {}; }
   /// Whose silence rules listen for: it reports that nothing waits to be written, and of a link arrivals as early as it can.

@@ -24,9 +24,12 @@ Bridge::~Bridge() { close(); }
 
 template <typename Kind, typename... Args>
 std::size_t Bridge::open(const Args&... args) {
-  auto made = std::make_unique<Kind>(node_, args...);
+  return open(std::make_unique<Kind>(node_, args...));
+}
+
+std::size_t Bridge::open(std::unique_ptr<Binding> binding) {
   const LockGuard lock(mutex_);
-  const bool is_new = bindings_.emplace(opened_, std::move(made)).second;
+  const bool is_new = bindings_.emplace(opened_, std::move(binding)).second;
   MAUVE_ENSURES(is_new);
   return opened_++;
 }
@@ -88,6 +91,12 @@ void Bridge::listen_for_silence(std::set<std::string> resources, std::set<std::s
 }
 
 void Bridge::close(const std::vector<std::size_t>& numbers) {
+  {
+    const LockGuard lock(mutex_);
+    for (const std::size_t number : numbers) {
+      if (bindings_.at(number)->is_attached()) bindings_.at(number)->end();
+    }
+  }
   while (send_some()) {
   }
   for (time_ns_t due_ns = 0; (due_ns = send_stops()) != kForever;)
@@ -117,6 +126,12 @@ void Bridge::start() {
 void Bridge::stop() {
   if (!running_) return;
   stop_receivers();
+  {
+    const LockGuard lock(mutex_);
+    for (const auto& [number, binding] : bindings_) {
+      if (binding->is_attached()) binding->end();
+    }
+  }
   running_ = false;
   ending_.store(true, std::memory_order_release);
   architecture_.publications().notify();

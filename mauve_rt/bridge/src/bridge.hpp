@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
-// The topics and services of an architecture, on a ROS node that someone else made; no interpreter on the way.
+// The topics, services and actions of an architecture, on a ROS node that someone else made; no interpreter on the way.
 #pragma once
 
 #include <map>
@@ -52,6 +52,8 @@ class Bridge {
   std::size_t call(const CallSettings& settings);
   /// A resource's call is a ROS service.
   std::size_t offer(const CallSettings& settings, const std::string& offered);
+  /// A binding that is made already.
+  std::size_t open(std::unique_ptr<Binding> binding);
 
   /// These serve the resources of their names from now on. [non-rt] Throws Error when one is none to serve.
   void attach(const std::vector<std::size_t>& numbers);
@@ -72,6 +74,7 @@ class Bridge {
   /// [non-rt]
   BridgeReport report();
   TopicLog& log() noexcept { return log_; }
+  rcl_node_t& node() noexcept { return node_; }
 
  private:
   template <typename Kind, typename... Args>

@@ -2,7 +2,6 @@
 #include "calls.hpp"
 
 #include <rcl/graph.h>
-#include <rmw/rmw.h>
 
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/guards.hpp"
@@ -21,15 +20,6 @@ std::string described(const CallSettings& settings) {
 }
 
 }  // namespace
-
-bool TypedMessage::deserialize(std::vector<std::byte>& message) {
-  const rcl_serialized_message_t serialized = borrowed(message);
-  return went_well(rmw_deserialize(&serialized, type_.type, get()));
-}
-
-bool TypedMessage::serialize(OwnedMessage& into) const {
-  return went_well(rmw_serialize(get(), type_.type, into.get()));
-}
 
 CalledService::CalledService(rcl_node_t& node, const CallSettings& settings)
     : Binding(settings.resource),

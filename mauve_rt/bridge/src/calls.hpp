@@ -14,6 +14,7 @@
 #include "binding.hpp"
 #include "owned.hpp"
 #include "type_support.hpp"
+#include "typed_message.hpp"
 
 namespace mauve::bridge {
 
@@ -22,21 +23,6 @@ struct CallSettings {
   std::string resource;
   std::string name;  // as given; rcl expands and remaps it
   std::string type;  // package/srv/Type
-};
-
-/// A message of rcl's own form, which only its type support knows. [non-rt]
-class TypedMessage {
- public:
-  explicit TypedMessage(const CallTypeSupport::Message& type)
-      : type_(type), data_(type.create(), type.destroy) {}
-  void* get() const noexcept { return data_.get(); }
-  /// False when it is malformed.
-  bool deserialize(std::vector<std::byte>& message);
-  bool serialize(OwnedMessage& into) const;
-
- private:
-  CallTypeSupport::Message type_;
-  std::unique_ptr<void, CallTypeSupport::Destroy> data_;
 };
 
 /// Carries a client's calls to a ROS service and the answers back.

@@ -5,6 +5,7 @@
 
 #include <bit>
 
+#include "actions.hpp"
 #include "bridge.hpp"
 #include "console.hpp"
 #include "interpreter.hpp"
@@ -29,6 +30,13 @@ std::size_t open_topic(Bridge& self, const std::string& resource, const std::str
                        const std::string& type, const rmw_qos_profile_t& qos, bool is_static) {
   return (self.*
           open)({.resource = resource, .name = topic, .type = type, .qos = qos, .is_static = is_static});
+}
+
+template <typename Kind>
+std::size_t open_action(Bridge& self, const std::string& resource, const std::string& action,
+                        const std::string& type) {
+  return self.open(std::make_unique<Kind>(
+      self.node(), ActionSettings{.resource = resource, .name = action, .type = type}));
 }
 
 /// From (name, type, "" | "fixed" | "sequence", size, fields).
@@ -291,6 +299,20 @@ As rclpy's QoSPolicyKind; 0: none.)");
       .def_readonly("service", &CallReport::service)
       .def_readonly("is_offered", &CallReport::is_offered)
       .def_readonly("counts", &CallReport::counts);
+  py::class_<ActionCounts>(module, "ActionCounts", "What became of goals so far.")
+      .def_readonly("accepted", &ActionCounts::accepted)
+      .def_readonly("rejected", &ActionCounts::rejected)
+      .def_readonly("succeeded", &ActionCounts::succeeded)
+      .def_readonly("canceled", &ActionCounts::canceled)
+      .def_readonly("aborted", &ActionCounts::aborted)
+      .def_readonly("refused", &ActionCounts::refused, "Decisions of components that fit no goal.");
+  py::class_<ActionReport>(
+      module, "ActionReport",
+      "A ROS action that a resource serves or calls: its name, expanded and remapped, and counts of goals.")
+      .def_readonly("resource", &ActionReport::resource)
+      .def_readonly("action", &ActionReport::action)
+      .def_readonly("is_offered", &ActionReport::is_offered)
+      .def_readonly("counts", &ActionReport::counts);
   py::class_<TopicReport>(module, "TopicReport",
                           "A bound topic: its name, expanded and remapped, and counts of messages.")
       .def_readonly("resource", &TopicReport::resource)
@@ -316,7 +338,7 @@ Raises:
                              "What the numbers are, in their order: position.x, ranges[3], path.length.");
   py::class_<Bridge>(
       module, "Bridge",
-      R"(The topics and services of an architecture, by threads of its own: one sends, the others receive.
+      R"(The topics, services and actions of an architecture, by threads of its own: one sends, the others receive.
 
 What is opened can be found on the network; it serves its resource from attach() on.)")
       .def(py::init([](std::uintptr_t node, std::uintptr_t architecture, int priority,
@@ -363,6 +385,10 @@ With `numbers`: all of them as mauve_msgs/msg/Values, their names on another top
           },
           py::arg("resource"), py::arg("service"), py::arg("type"), py::arg("offered"), Unlocked(),
           "Open a ROS service that a resource's call `offered` answers; as publish().")
+      .def("call_action", &open_action<CalledAction>, py::arg("resource"), py::arg("action"), py::arg("type"),
+           Unlocked(), "Open a ROS action whose server executes a client's goals; as publish().")
+      .def("offer_action", &open_action<OfferedAction>, py::arg("resource"), py::arg("action"),
+           py::arg("type"), Unlocked(), "Open a ROS action whose goals a resource takes; as publish().")
       .def("attach", &Bridge::attach, py::arg("numbers"), Unlocked(),
            R"(Let these serve the resources of their names in the architecture.
 
@@ -387,6 +413,8 @@ Raises:
           "topics", [](Bridge& self) { return self.report().topics; }, Unlocked())
       .def(
           "calls", [](Bridge& self) { return self.report().calls; }, Unlocked())
+      .def(
+          "actions", [](Bridge& self) { return self.report().actions; }, Unlocked())
       .def(
           "log", [](Bridge& self, bool on) { self.log().enable(on); }, py::arg("on"),
           "Keep messages for take_log() from now on, or do not.")

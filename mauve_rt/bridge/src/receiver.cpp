@@ -42,8 +42,9 @@ void Receiver::stop() {
 
 void Receiver::run() {
   rcl_wait_set_t set = rcl_get_zero_initialized_wait_set();
-  const std::size_t count = arrivals_.size();  // room for as many of each kind
-  if (rcl_wait_set_init(&set, count, 1, 0, count, count, count, &context_, rcl_get_default_allocator()) !=
+  std::size_t count = 0;  // room for as many of each kind
+  for (const Arrival* arrival : arrivals_) count += arrival->entities();
+  if (rcl_wait_set_init(&set, count, 1, count, count, count, count, &context_, rcl_get_default_allocator()) !=
       RCL_RET_OK) {
     rcl_reset_error();
     return;

@@ -22,6 +22,8 @@ class Arrival {
   Arrival(const Arrival&) = delete;
   Arrival& operator=(const Arrival&) = delete;
 
+  /// How much room it needs in a wait set, of each kind of entity. [non-rt]
+  virtual std::size_t entities() const { return 1; }
   /// Puts itself into a cleared wait set with room for it. [non-rt]
   virtual void join(rcl_wait_set_t& set) = 0;
   /// Whether something arrived, after the wait. [non-rt]

@@ -2,6 +2,7 @@
 #include "type_support.hpp"
 
 #include <dlfcn.h>
+#include <rosidl_runtime_c/action_type_support_struct.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -14,10 +15,18 @@ namespace mauve::bridge {
 
 namespace {
 
+constexpr const char* kTypeSupports = "rosidl_typesupport_c";
+constexpr const char* kStructs = "rosidl_generator_c";
+
+std::string noun(const std::string& kind) {
+  if (kind == "action") return "action";
+  return kind == "msg" ? "message" : "service";
+}
+
 /// A type's name in its two parts.
 class TypeName {
  public:
-  /// `kind`: msg or srv. Throws Error (unknown_type) when it is no such name.
+  /// `kind`: msg, srv or action. Throws Error (unknown_type) when it is no such name.
   TypeName(const std::string& full, const std::string& kind) : full_(full), kind_(kind) {
     const std::size_t package_end = full.find("/" + kind + "/");
     if (package_end == std::string::npos) throw_unknown("a name without /" + kind + "/");
@@ -27,8 +36,7 @@ class TypeName {
   }
 
   [[noreturn]] void throw_unknown(const std::string& found) const {
-    throw Error(ErrorCode::unknown_type,
-                kind_ == "msg" ? "the message type is not installed" : "the service type is not installed",
+    throw Error(ErrorCode::unknown_type, "the " + noun(kind_) + " type is not installed",
                 {.element = "type " + full_,
                  .expected = "package/" + kind_ + "/Type of an installed interface package",
                  .found = found,
@@ -44,6 +52,12 @@ class TypeName {
     const auto found = reinterpret_cast<Function>(dlsym(library, symbol.c_str()));
     if (found == nullptr) throw_unknown("package " + package_ + " without a " + kind_ + " " + name_);
     return found;
+  }
+  /// What makes messages of a part of the type.
+  MessageFunctions functions(const rosidl_message_type_support_t* support, const std::string& part) const {
+    return {.type = support,
+            .create = find<MessageFunctions::Create>(kStructs, "", part + "__create"),
+            .destroy = find<MessageFunctions::Destroy>(kStructs, "", part + "__destroy")};
   }
 
  private:
@@ -73,9 +87,6 @@ class TypeName {
   std::string name_;
 };
 
-constexpr const char* kTypeSupports = "rosidl_typesupport_c";
-constexpr const char* kStructs = "rosidl_generator_c";
-
 }  // namespace
 
 const rosidl_message_type_support_t& message_type_support(const std::string& type) {
@@ -89,16 +100,24 @@ CallTypeSupport call_type_support(const std::string& type) {
   const TypeName name(type, "srv");
   const std::string before = "rosidl_typesupport_c__get_service_type_support_handle__";
   const rosidl_service_type_support_t* const service = name.find<Getter>(kTypeSupports, before, "")();
-  const auto message = [&name](const rosidl_message_type_support_t* support, const std::string& part) {
-    using Create = CallTypeSupport::Create;
-    using Destroy = CallTypeSupport::Destroy;
-    return CallTypeSupport::Message{.type = support,
-                                    .create = name.find<Create>(kStructs, "", part + "__create"),
-                                    .destroy = name.find<Destroy>(kStructs, "", part + "__destroy")};
-  };
   return {.service = service,
-          .request = message(service->request_typesupport, "_Request"),
-          .response = message(service->response_typesupport, "_Response")};
+          .request = name.functions(service->request_typesupport, "_Request"),
+          .response = name.functions(service->response_typesupport, "_Response")};
+}
+
+ActionTypeSupport action_type_support(const std::string& type) {
+  using Getter = const rosidl_action_type_support_t* (*)();
+  const TypeName name(type, "action");
+  const std::string before = "rosidl_typesupport_c__get_action_type_support_handle__";
+  const rosidl_action_type_support_t* const action = name.find<Getter>(kTypeSupports, before, "")();
+  const rosidl_service_type_support_t& goal = *action->goal_service_type_support;
+  const rosidl_service_type_support_t& result = *action->result_service_type_support;
+  return {.action = action,
+          .goal_request = name.functions(goal.request_typesupport, "_SendGoal_Request"),
+          .goal_response = name.functions(goal.response_typesupport, "_SendGoal_Response"),
+          .result_request = name.functions(result.request_typesupport, "_GetResult_Request"),
+          .result_response = name.functions(result.response_typesupport, "_GetResult_Response"),
+          .feedback = name.functions(action->feedback_message_type_support, "_FeedbackMessage")};
 }
 
 }  // namespace mauve::bridge

@@ -7,27 +7,44 @@
 
 #include <string>
 
+struct rosidl_action_type_support_t;
+
 namespace mauve::bridge {
 
 /// The type support of `package/msg/Type`; its library stays loaded. [non-rt]
 /// Throws Error (unknown_type) naming what is not installed.
 const rosidl_message_type_support_t& message_type_support(const std::string& type);
 
-/// The type of a ROS service, and how its messages are made.
-struct CallTypeSupport {
+/// A part of a type, and how messages of it are made.
+struct MessageFunctions {
   using Create = void* (*)();
   using Destroy = void (*)(void*);
-  struct Message {
-    const rosidl_message_type_support_t* type;
-    Create create;
-    Destroy destroy;
-  };
+  const rosidl_message_type_support_t* type;
+  Create create;
+  Destroy destroy;
+};
+
+/// The type of a ROS service.
+struct CallTypeSupport {
   const rosidl_service_type_support_t* service;
-  Message request;
-  Message response;
+  MessageFunctions request;
+  MessageFunctions response;
 };
 
 /// Of `package/srv/Type`. [non-rt] Throws Error (unknown_type) when it is not installed.
 CallTypeSupport call_type_support(const std::string& type);
+
+/// The type of a ROS action.
+struct ActionTypeSupport {
+  const rosidl_action_type_support_t* action;
+  MessageFunctions goal_request;
+  MessageFunctions goal_response;
+  MessageFunctions result_request;
+  MessageFunctions result_response;
+  MessageFunctions feedback;
+};
+
+/// Of `package/action/Type`. [non-rt] Throws Error (unknown_type) when it is not installed.
+ActionTypeSupport action_type_support(const std::string& type);
 
 }  // namespace mauve::bridge

@@ -132,6 +132,7 @@ PluginRegistry::PluginRegistry() {
   };
   std::apply([&](auto... kinds) { (add(kinds), ...); }, GivenResources{});
   ports_.emplace(type_name<EventCount>(), data_ports<EventCount>());
+  type<ActionGoal>();  // of the actions of any type, also where only Python knows it
 }
 
 std::vector<ResourceKind> PluginRegistry::given_resource_kinds() {
@@ -420,10 +421,11 @@ void PluginRegistry::throw_not_of_type(const ResourceKind& kind, const std::stri
                  .remedy = "use shared_data, or bounded members in the type"});
   }
   if (kind.type == TypeNeed::data) throw_unknown_type(type);
-  if (kind.type == TypeNeed::call) {
-    throw Error(ErrorCode::unknown_type, "the type of call is not registered",
+  if (kind.type == TypeNeed::call || kind.type == TypeNeed::action) {
+    const char* const what = kind.type == TypeNeed::call ? "call" : "action";
+    throw Error(ErrorCode::unknown_type, "the type of " + std::string(what) + " is not registered",
                 {.element = "type " + type,
-                 .expected = "one of " + join(names("call_type")),
+                 .expected = "one of " + join(names(std::string(to_string(kind.type)))),
                  .found = type,
                  .remedy = "check the name, and that a package registers it among its plug-ins"});
   }
@@ -499,13 +501,14 @@ std::vector<std::string> PluginRegistry::names(const std::string& kind) const {
     for (const auto& [name, entry] : resources_) {
       if (!entry.factories.empty()) found.insert(name);
     }
-  } else if (kind == "type" || kind == "call_type") {
+  } else if (kind == to_string(TypeNeed::data) || kind == to_string(TypeNeed::call) ||
+             kind == to_string(TypeNeed::action)) {
     for (const auto& [name, entry] : resources_) {
-      if (entry.kind.type == (kind == "type" ? TypeNeed::data : TypeNeed::call)) add_keys(entry.factories);
+      if (to_string(entry.kind.type) == kind) add_keys(entry.factories);
     }
   } else {
     throw Error(ErrorCode::invalid_argument, "there is no such kind of plug-in",
-                {.expected = "shell, core, fsm, resource, type or call_type", .found = kind});
+                {.expected = "shell, core, fsm, resource, type, call_type or action_type", .found = kind});
   }
   return {found.begin(), found.end()};
 }

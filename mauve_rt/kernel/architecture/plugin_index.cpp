@@ -17,7 +17,7 @@ namespace mauve {
 
 namespace {
 
-constexpr std::array kKinds{"type", "call_type", "resource", "shell", "core", "fsm"};
+constexpr std::array kKinds{"type", "call_type", "action_type", "resource", "shell", "core", "fsm"};
 
 std::string shell_of(const PluginRegistry& registry, std::string_view kind, const std::string& name) {
   if (kind == "core") return registry.core_shell(name);

@@ -1,4 +1,4 @@
-"""Resources bound to ROS topics and services. All data goes by the native bridge; this opens it.
+"""Resources bound to ROS topics, services and actions. All data goes by the native bridge; this opens it.
 
 Who binds a resource while the executor runs does it in two steps around the commit that adds it: open()
 before, where everything can still be refused, attach() after.
@@ -12,13 +12,13 @@ from typing import Any, NamedTuple
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSProfile
 
-from mauve_rt._bridge import Bridge, CallReport, FlatNumbers, TopicReport
+from mauve_rt._bridge import ActionReport, Bridge, CallReport, FlatNumbers, TopicReport
 from mauve_rt._kernel import Architecture, ResourceDescription
 from mauve_rt.errors import MauveError, TopicError
 from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
-from mauve_rt.model.schema import ResourceModel, ServiceModel, TopicModel
+from mauve_rt.model.schema import ActionModel, ResourceModel, ServiceModel, TopicModel
 from mauve_rt.trace.bag.recorded import SentMessage
 
 MAX_MIRRORS = 64
@@ -99,7 +99,7 @@ class BoundResources:
     def open(
         self, resources: Mapping[str, ResourceModel], described: Mapping[str, ResourceDescription]
     ) -> dict[str, list[int]]:
-        """Open the topics and services of these resources, which need not be there yet; for attach().
+        """Open the topics, services and actions of these resources, which may come later; for attach().
 
         Raises:
             MauveError: as configure(); none of them is open then.
@@ -116,6 +116,8 @@ class BoundResources:
                         numbers.append(self._open_topic(bridge, name, resource, topic, is_static=is_static))
                     if resource.service is not None:
                         numbers.append(_open_service(bridge, name, described[name], resource.service))
+                    if resource.action is not None:
+                        numbers.append(_open_action(bridge, name, resource, resource.action))
             except MauveError:
                 self.discard(opened)
                 raise
@@ -264,6 +266,9 @@ class BoundResources:
         for call in self.calls():
             side = "offers" if call.is_offered else "calls"
             found.setdefault(call.resource, {})[side] = call.service
+        for action in self.actions():
+            side = "offers" if action.is_offered else "calls"
+            found.setdefault(action.resource, {})[side] = action.action
         return found
 
     def heard(self) -> dict[str, str]:
@@ -292,6 +297,11 @@ class BoundResources:
         """How each ROS service that is called or offered fares."""
         bridge = self._bridge
         return bridge.calls() if bridge is not None else []
+
+    def actions(self) -> list[ActionReport]:
+        """What became of the goals of each ROS action that is offered or called."""
+        bridge = self._bridge
+        return bridge.actions() if bridge is not None else []
 
     def other_types(self) -> dict[str, list[str]]:
         """Types that other nodes use on the bound topics: by the graph, as the middleware need not tell."""
@@ -334,6 +344,11 @@ def _open_service(bridge: Bridge, name: str, resource: ResourceDescription, serv
         return bridge.call(name, service.name, resource.type)
     offered = next(each for each in resource.services if each.name == service.offers)
     return bridge.offer(name, service.name, offered.type, service.offers)
+
+
+def _open_action(bridge: Bridge, name: str, resource: ResourceModel, action: ActionModel) -> int:
+    is_offered = resource.kind == "action_server"
+    return (bridge.offer_action if is_offered else bridge.call_action)(name, action.name, resource.type)
 
 
 def _others(types: Sequence[str], type_name: str) -> list[str]:

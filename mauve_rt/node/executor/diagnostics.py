@@ -8,7 +8,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rclpy.lifecycle import LifecycleNode
 from rclpy.qos import QoSPolicyKind, QoSProfile
 
-from mauve_rt._bridge import CallReport, TopicReport
+from mauve_rt._bridge import ActionReport, CallReport, TopicReport
 from mauve_rt._kernel import (
     HELD_STOPPED,
     ComponentDescription,
@@ -81,6 +81,7 @@ class Diagnostics:
         others = self._bound.other_types()
         array.status += [self._topic(report, others.get(report.topic)) for report in self._bound.topics()]
         array.status += [self._call(report) for report in self._bound.calls()]
+        array.status += [self._action(report) for report in self._bound.actions()]
         array.status += [
             self._refusals(one) for one in self._runtime.described_resources() if one.refused_values
         ]
@@ -228,6 +229,24 @@ class Diagnostics:
             "no_server": counts.no_server,
             "timed_out": counts.timed_out,
             "refused": counts.other,
+        }
+        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
+        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
+
+    def _action(self, report: ActionReport) -> Any:
+        counts = report.counts
+        failures = {"goals rejected": counts.rejected, "goals aborted": counts.aborted}
+        name = f"action {report.action} ({report.resource})"
+        remarks = self._grown(name, failures | {"decisions that fit no goal": counts.refused})
+        values: dict[str, object] = {
+            "resource": report.resource,
+            "side": "server" if report.is_offered else "client",
+            "accepted": counts.accepted,
+            "rejected": counts.rejected,
+            "succeeded": counts.succeeded,
+            "canceled": counts.canceled,
+            "aborted": counts.aborted,
+            "refused_decisions": counts.refused,
         }
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         return self._status(name, level, "; ".join(remarks) or "no trouble", values)

@@ -16,13 +16,15 @@ _PRIMITIVES = frozenset(
 )
 _FIELD = re.compile(r"\s*(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[A-Za-z]")
 _MESSAGE_NAME_PARTS = 3  # package/msg/Name
+_PART_OF_ACTION = re.compile(r"(?P<action>[^/]+/action/[^/_]+)_(?P<part>Goal|Result|Feedback)")
+_SECTIONS = ("Goal", "Result", "Feedback")  # of an .action file, between lines of ---
 
 
 class Definition(NamedTuple):
     """A message type as it goes into a bag."""
 
     type_name: str
-    """package/msg/Name"""
+    """package/msg/Name, or package/action/Name_Goal, _Result or _Feedback"""
     text: str
     """The .msg file, then each type it uses, behind a line of 80 '=' and one `MSG: package/Name`."""
     type_hash: str
@@ -31,6 +33,8 @@ class Definition(NamedTuple):
 
 def find_definition(type_name: str) -> Definition:
     """Definition of a type, e.g. geometry_msgs/msg/Pose2D. Looks in AMENT_PREFIX_PATH, then in sys.prefix.
+
+    Of a part of an action (package/action/Name_Goal) the text is a section of the .action file.
 
     Raises:
         TraceError: the type, or one that it uses, is in no installed package; says what to install or source.
@@ -42,7 +46,7 @@ def find_definition(type_name: str) -> Definition:
         name = pending.pop()
         if name in texts:
             continue
-        texts[name] = _share_file(name, ".msg", used_by=type_name).read_text(encoding="utf-8")
+        texts[name] = _text(name, used_by=type_name)
         package = name.split("/", 1)[0]
         pending += [_full_name(used, package) for used in reversed(_used_types(texts[name]))]
     (first, main), *others = texts.items()
@@ -51,6 +55,19 @@ def find_definition(type_name: str) -> Definition:
         package, _, short = name.split("/")
         parts.append(f"{SEPARATOR}\nMSG: {package}/{short}\n{text.rstrip(chr(10))}")
     return Definition(first, "\n".join(parts) + "\n", _type_hash(first))
+
+
+def _text(name: str, *, used_by: str) -> str:
+    """Return the .msg file of a type, or its section of an .action file."""
+    part = _PART_OF_ACTION.fullmatch(name)
+    if part is None:
+        return _share_file(name, ".msg", used_by=used_by).read_text(encoding="utf-8")
+    file = _share_file(part["action"], ".action", used_by=name)
+    sections = re.split(r"^---[ \t]*$\n?", file.read_text(encoding="utf-8"), flags=re.MULTILINE)
+    if len(sections) != len(_SECTIONS):
+        msg = f"{file}: expected {len(_SECTIONS)} sections between lines of ---, found {len(sections)}"
+        raise TraceError(msg)
+    return sections[_SECTIONS.index(part["part"])]
 
 
 def _used_types(text: str) -> list[str]:
@@ -65,7 +82,8 @@ def _full_name(name: str, package: str) -> str:
         parts = [package, "msg", *parts]
     elif len(parts) == _MESSAGE_NAME_PARTS - 1:
         parts.insert(1, "msg")
-    if len(parts) != _MESSAGE_NAME_PARTS or parts[1] != "msg" or not all(parts):
+    is_part = _PART_OF_ACTION.fullmatch(name) is not None
+    if not is_part and (len(parts) != _MESSAGE_NAME_PARTS or parts[1] != "msg" or not all(parts)):
         msg = f"message type '{name}': expected package/msg/Name"
         raise TraceError(msg)
     return "/".join(parts)
@@ -93,7 +111,9 @@ def _share_file(name: str, suffix: str, *, used_by: str) -> Path:
 
 def _type_hash(name: str) -> str:
     try:
-        described = json.loads(_share_file(name, ".json", used_by=name).read_text(encoding="utf-8"))
+        part = _PART_OF_ACTION.fullmatch(name)
+        file = _share_file(part["action"] if part else name, ".json", used_by=name)
+        described = json.loads(file.read_text(encoding="utf-8"))
         hashes = {entry["type_name"]: str(entry["hash_string"]) for entry in described["type_hashes"]}
     except (TraceError, OSError, ValueError, KeyError, TypeError):
         return ""  # an interface package older than type hashes; a bag may leave it empty

@@ -97,7 +97,9 @@ TEST(UserResource, IsPartOfAnArchitectureByItsPlugInName) {
   registry.shell<MapShell>("test/MapShell");
   Architecture architecture(&registry);
   architecture.add_resource("map", registry.make_resource("test/CellMap", "", {}));
-  EXPECT_THAT(registry.names("resource"), ::testing::ElementsAre("event", "test/CellMap", "transform_tree"));
+  EXPECT_THAT(registry.names("resource"),
+              ::testing::ElementsAre("event", "latest_value", "ring_buffer", "shared_data", "test/CellMap",
+                                     "transform_tree"));
   architecture.configure();
   EXPECT_TRUE(architecture.resource("map").is_configured());
   EXPECT_THROW(architecture.publish("map"), Error);

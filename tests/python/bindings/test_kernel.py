@@ -105,7 +105,7 @@ def test_a_library_s_parts_are_known_by_name(registry: PluginRegistry):
         f"mauve_examples/{name}Shell" for name in ("AngleController", "Metronome", "Pendulum")
     ]
     assert {ACCELERANDO, METRONOME} < {*registry.names("core")}
-    assert registry.names("type") == [FLOAT]
+    assert registry.names("type") == ["mauve_msgs/msg/ActionGoal", FLOAT]
     assert registry.core_shell(ACCELERANDO) == registry.fsm_shell(FSM) == SHELL
     registry.load_library(str(library()))  # once more does nothing
 

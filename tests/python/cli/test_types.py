@@ -71,3 +71,20 @@ def test_other_words_are_bad_usage(capsys: pytest.CaptureFixture[str]) -> None:
 def test_an_unknown_type_is_refused(plugin_prefix: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["types", "executor_tests/Atitude"]) == 2
     assert "executor_tests/Attitude" in capsys.readouterr().err
+
+
+def test_an_action_has_the_fields_of_its_parts(
+    plugin_prefix: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    name = "mauve_msgs/action/DriveTo"
+    lines = run(name, capsys=capsys).splitlines()
+    parts = [line.partition(":")[0] for line in lines if not line.startswith(" ")]
+    assert parts == [f"{name}_{part}" for part in ("Goal", "Result", "Feedback")]
+    assert lines[-2:] == ["  float64 distance_m", "  float64 elapsed_s"]
+    assert [each["type"] for each in json.loads(run(name, "--json", capsys=capsys))] == parts
+    goal, result, feedback = run("msg", name, capsys=capsys).split("---\n")
+    assert goal == "geometry_msgs/PoseStamped pose\nfloat64 tolerance_m\n"
+    assert result == "float64 distance_m\nbool reached\n"
+    assert feedback == "float64 distance_m\nfloat64 elapsed_s\n"
+    listed = {row["type"] for row in json.loads(run("--json", capsys=capsys))}
+    assert {*parts} <= listed

@@ -79,6 +79,8 @@ def test_the_given_kinds_tell_what_files_may_say_of_them() -> None:
         "latest_value": ["max_readers"],
         "event": [],
         "client": ["service.timeout_ms"],
+        "action_server": ["goals", "action.answer_ms"],
+        "action_client": ["action.answer_ms"],
         "transform_tree": ["frames", "history", "static_topic"],
     }
     assert all(each.description for kind in given_kinds().values() for each in kind.parameters)
@@ -141,7 +143,7 @@ BAD = {
         "length_s: 2",
         "xxxx: 2",
         "xxxx",
-        "unknown key 'xxxx' of resource 'window'; known: child_frame, frame, kind, label, length_s",
+        "unknown key 'xxxx' of resource 'window'; known: action, child_frame, frame, kind, label, length_s",
     ),
     "of another kind": (
         "length_s: 2",

@@ -38,6 +38,16 @@ def test_the_papers_guidance_is_a_model() -> None:
     [
         ("goal: {read: Point2D}", "goal: {read: Pont2D}", "model.yaml:14:20: unknown type 'Pont2D'"),
         (
+            "goal: {read: Point2D}",
+            "goal: {read: mauve_msgs/action/DriveTo}",
+            "an action is no type of values, found 'mauve_msgs/action/DriveTo': expected mauve_msgs",
+        ),
+        (
+            "{x: float64, y: float64}",
+            "{x: mauve_msgs/action/DriveTo_Goal}",
+            "a message has no field of 'mauve_msgs/action/DriveTo_Goal', a message of an action; name its",
+        ),
+        (
             "Point2D[<=64]",
             "Point2D[]",
             "6:18: type 'Point2D[]' has no bound: expected one with a bound, such as",

@@ -69,6 +69,19 @@ def test_interfaces_of_others_are_named() -> None:
     assert found == ["geometry_msgs/msg/Point", "nav_msgs/msg/Odometry", "std_srvs/srv/Trigger"]
 
 
+def test_ports_of_the_parts_of_an_action_register_the_action() -> None:
+    text = GUIDANCE.read_text(encoding="utf-8")
+    text = text.replace("goal: {read: Point2D}", "goal: {read: mauve_msgs/action/DriveTo_Goal}")
+    text = text.replace("target: {write: Point2D", "target: {write: mauve_msgs/action/DriveTo_Feedback")
+    model = load_model("model.yaml", text=text)
+    assert interfaces(model) == ["mauve_msgs/action/DriveTo"]
+    files = generated(model)
+    header = files["include/my_robot/model/guidance_shell.hpp"]
+    assert "#include <mauve_types/mauve_msgs/action/drive_to.hpp>" in header
+    assert 'read_port<mauve::msg::mauve_msgs::DriveTo::Goal>("goal")' in header
+    assert files["src/plugins.cpp"].count("action_type<mauve::msg::mauve_msgs::DriveTo>()") == 1
+
+
 def test_frames_of_ports_are_in_both_languages() -> None:
     text = GUIDANCE.read_text(encoding="utf-8")
     text = text.replace("goal: {read: Point2D}", "goal: {read: Point2D, optional: true, frame: map}")

@@ -28,6 +28,7 @@ PORTS = st.sampled_from(
         {"read": "geometry_msgs/msg/Point"},
         {"read": "std_msgs/msg/Float64", "optional": True},
         {"write": "geometry_msgs/msg/Twist"},
+        {"write": "mauve_msgs/action/DriveTo_Feedback"},
         {"write": "std_msgs/msg/Bool", "on_commit": "set_zero", "on_stop": "hold"},
         {"event": True},
         {"event": True, "optional": True},

@@ -14,6 +14,7 @@ from python_parts import POSE, ActFsm, CountCore, CountShell, EmptyShell, HearCo
 from rclpy.serialization import deserialize_message, serialize_message
 
 from mauve_examples.tutorials.python_component import RoverCore, SlipperyCore, make_architecture
+from mauve_msgs.action import DriveTo
 from mauve_rt.api import (
     Architecture,
     Core,
@@ -138,6 +139,46 @@ def test_classes_can_be_registered_by_name(built: Stage):
 
 
 # ---- messages that no library registered
+
+
+class DriveShell(Shell):
+    goal = read_port(DriveTo.Goal)
+    feedback = write_port("mauve_msgs/action/DriveTo_Feedback")
+
+
+class DriveCore(Core[DriveShell]):
+    def configure(self) -> None:
+        self.goals: list[Any] = []
+
+    def act(self) -> None:
+        self.goals.append(self.shell.goal.read().value)
+        self.shell.feedback.write(DriveTo.Feedback(distance_m=self.goals[-1].tolerance_m))
+
+
+class AskToDriveShell(Shell):
+    goal = write_port(DriveTo.Goal)
+    feedback = read_port(DriveTo.Feedback)
+
+
+class AskToDriveCore(Core[AskToDriveShell]):
+    def configure(self) -> None:
+        self.distances: list[float] = []
+
+    def act(self) -> None:
+        self.shell.goal.write(DriveTo.Goal(tolerance_m=0.25))
+        self.distances.append(self.shell.feedback.read().value.distance_m)
+
+
+def test_ports_in_python_have_the_parts_of_an_action_as_types(built: Stage):
+    built.add("drive", DriveShell, DriveCore)
+    built.add("ask", AskToDriveShell, AskToDriveCore)
+    built.share("goal", SharedData(DriveTo.Goal), "ask.goal.write", "drive.goal.read")
+    built.share("feedback", SharedData(DriveTo.Feedback), "drive.feedback.write", "ask.feedback.read")
+    built.deploy()
+    ask = built.architecture.component("ask").core
+    built.until(lambda: 0.25 in ask.distances)
+    types = {(port.name, port.type) for port in built.describe("drive").ports}
+    assert types == {(part, f"mauve_msgs/action/DriveTo_{part.title()}") for part in ("goal", "feedback")}
 
 
 def test_unregistered_messages_travel_between_components_in_python(built: Stage):

@@ -6,7 +6,9 @@ from pathlib import Path
 import pytest
 from std_srvs.srv import SetBool
 
-from mauve_rt.parts.message_types import message_class, service_class
+from mauve_msgs.action import DriveTo
+from mauve_rt.parts.message_types import action_class, message_class, service_class
+from mauve_rt.parts.messages import type_name
 
 NO_TYPES = (
     "",
@@ -31,6 +33,12 @@ NO_TYPES = (
     "std_msgs/msg/Fl\u00f6at",
     "std_msgs/msg/" + "F" * 100_000,
     "s" * 300 + "/msg/Float64",
+    "executor_tests_trap/action/X_Goal",
+    "mauve_msgs/action/DriveTo",
+    "mauve_msgs/action/DriveTo_SendGoal_Request",
+    "mauve_msgs/action/Nothing_Goal",
+    "mauve_msgs/msg/DriveTo_Goal",
+    "mauve_msgs/../mauve_msgs/action/DriveTo_Goal",
 )
 
 
@@ -65,4 +73,13 @@ def test_a_package_that_is_listed_is_imported_from_its_prefix_only(
 def test_installed_types() -> None:
     assert message_class("std_msgs/msg/Float64").__name__ == "Float64"
     assert service_class("std_srvs/srv/SetBool") is SetBool
+    assert action_class("mauve_msgs/action/DriveTo") is DriveTo
+    assert action_class("mauve_msgs/action/Drive") is None
     assert message_class("std_srvs/srv/SetBool") is None
+
+
+@pytest.mark.parametrize("part", ["Goal", "Result", "Feedback"])
+def test_a_part_of_an_action_has_the_name_that_rosidl_gives_it(part: str) -> None:
+    name = f"mauve_msgs/action/DriveTo_{part}"
+    assert message_class(name) is getattr(DriveTo, part)
+    assert type_name(getattr(DriveTo, part)) == name

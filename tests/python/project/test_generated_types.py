@@ -58,10 +58,12 @@ std_msgs/Header header
     "msg/Nothing.msg": "int32 ONE=1\n",
     "srv/Ask.srv": "Part part\n---\nint32 number -1\n",
     "action/Go.action": "float64 goal\n---\nint32 result\n---\nPart part\n",
+    "action/Turn.action": "float64 angle\n---\nbool reached\n---\nfloat64 left\n",
 }
 PROGRAM = r"""
 #include <mauve_rt/mauve_rt.hpp>
 #include <mauve_types/odd_interfaces/action/go.hpp>
+#include <mauve_types/odd_interfaces/action/turn.hpp>
 #include <mauve_types/odd_interfaces/msg/large.hpp>
 #include <mauve_types/odd_interfaces/msg/nothing.hpp>
 #include <mauve_types/odd_interfaces/msg/odd.hpp>
@@ -72,6 +74,7 @@ using mauve::msg::odd_interfaces::Go;
 using mauve::msg::odd_interfaces::Large;
 using mauve::msg::odd_interfaces::Nothing;
 using mauve::msg::odd_interfaces::Odd;
+using mauve::msg::odd_interfaces::Turn;
 
 static_assert(Odd::BYTE == 1 && Odd::CHAR == 2 && Odd::RATIO == 0.1F && Nothing::ONE == 1);
 static_assert(Odd::LEAST == INT64_MIN && Odd::MOST == UINT64_MAX);
@@ -81,6 +84,9 @@ static_assert(!mauve::DescribedCall<Ask>, "a request with a sequence cannot be c
 static_assert(mauve::DescribedCall<Go::SendGoal> && mauve::DescribedCall<Go::GetResult>);
 static_assert(mauve::Described<Go::Goal> && mauve::Described<Go::Result> && mauve::Described<Go::Feedback> &&
               mauve::Described<Go::FeedbackMessage>);
+static_assert(mauve::DescribedAction<Turn>);
+static_assert(mauve::ActionTraits<Turn>::name == "odd_interfaces/action/Turn");
+static_assert(!mauve::DescribedAction<Go>, "feedback with a sequence cannot be copied");
 
 #define EXPECT(...) \
   if (!(__VA_ARGS__)) return #__VA_ARGS__

@@ -187,8 +187,17 @@ def test_each_parameter_is_described(printed: str) -> None:
     assert parameters - _described("node_parameters") == set()
 
 
-@pytest.mark.parametrize(("part", "module"), [("messages", "mauve_msgs.msg"), ("services", "mauve_msgs.srv")])
-def test_each_field_of_messages_and_services_is_there(part: str, module: str) -> None:
+@pytest.mark.parametrize(
+    ("part", "module", "sections"),
+    [
+        ("messages", "mauve_msgs.msg", ()),
+        ("services", "mauve_msgs.srv", ("Request", "Response")),
+        ("actions", "mauve_msgs.action", ("Goal", "Result", "Feedback")),
+    ],
+)
+def test_each_field_of_messages_services_and_actions_is_there(
+    part: str, module: str, sections: tuple[str, ...]
+) -> None:
     types = {
         name: each
         for name, each in vars(import_module(module)).items()
@@ -197,7 +206,7 @@ def test_each_field_of_messages_and_services_is_there(part: str, module: str) ->
     assert set(types) - _headings(part) == set()
     for name, each in types.items():
         section = _parts()[part].partition(f"## {name}\n")[2].partition("\n## ")[0]
-        bodies = [each] if part == "messages" else [each.Request, each.Response]
+        bodies = [getattr(each, section) for section in sections] or [each]
         fields = {field for body in bodies for field in body.get_fields_and_field_types()}
         assert {field for field in fields if f"`{field}`" not in section} == set(), name
 

@@ -54,13 +54,36 @@ def test_a_type_without_a_hash_file_has_none(prefix: AddMessage):
     assert find_definition("p/A").type_hash == ""
 
 
+def test_a_part_of_an_action_is_a_section_of_its_file(prefix: AddMessage, tmp_path: Path):
+    prefix("p/msg/B", "float64 x\n")
+    prefix("p/action/Go", "", "RIHS01_g")
+    (tmp_path / "share/p/action/Go.action").write_text("B to  # ---\n--- \n---\nint8 left\nB at\n")
+    described = tmp_path / "share/p/action/Go.json"
+    described.write_text(described.read_text().replace('"p/action/Go"', '"p/action/Go_Goal"'))
+    goal = find_definition("p/action/Go_Goal")
+    assert goal.type_hash == "RIHS01_g"
+    assert goal.text == f"B to  # ---\n{SEPARATOR}\nMSG: p/B\nfloat64 x\n"
+    assert find_definition("p/action/Go_Result").text == "\n"
+    assert find_definition("p/action/Go_Feedback").text.startswith("int8 left\nB at\n====")
+    (tmp_path / "share/p/action/Go.action").write_text("B to\n---\n")
+    with pytest.raises(TraceError, match=r"Go\.action: expected 3 sections between lines of ---, found 2"):
+        find_definition("p/action/Go_Goal")
+
+
+def test_the_parts_of_an_installed_action_have_hashes_of_their_own():
+    names = [f"mauve_msgs/action/DriveTo_{part}" for part in ("Goal", "Result", "Feedback")]
+    hashes = {find_definition(name).type_hash for name in names}
+    assert len(hashes) == len(names)
+    assert all(one.startswith("RIHS01_") for one in hashes)
+
+
 def test_a_missing_dependency_says_what_to_do(prefix: AddMessage):
     prefix("p/msg/A", "far/Away x\n")
     with pytest.raises(TraceError, match=r"far/msg/Away.*used by p/msg/A.*install or build the package far"):
         find_definition("p/msg/A")
 
 
-@pytest.mark.parametrize("name", ["", "A", "p/srv/A", "p/msg/", "a/b/c/d"])
+@pytest.mark.parametrize("name", ["", "A", "p/srv/A", "p/msg/", "a/b/c/d", "p/action/A", "p/action/A_Part"])
 def test_a_name_that_is_none_is_refused(name: str):
     with pytest.raises(TraceError, match="expected package/msg/Name"):
         find_definition(name)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from rclpy.serialization import serialize_message
 
+from mauve_msgs.action import DriveTo
 from mauve_rt.trace.format.definitions import find_definition
 from mauve_rt.trace.format.message_decoding import Decoder
 
@@ -32,12 +33,17 @@ TYPES = (
     "std_msgs/msg/Empty",
     "std_msgs/msg/Float64MultiArray",
     "std_msgs/msg/String",
+    "mauve_msgs/action/DriveTo_Feedback",
+    "mauve_msgs/action/DriveTo_Goal",
+    "mauve_msgs/action/DriveTo_Result",
 )
 BITS = {f"{sign}int{bits}": bits for sign in ("", "u") for bits in (8, 16, 32, 64)} | {"char": 8}
 
 
 def message_class(type_name: str) -> Any:
     package, _, name = type_name.rpartition("/")
+    if package == "mauve_msgs/action":
+        return getattr(DriveTo, name.removeprefix("DriveTo_"))
     return getattr(import_module(f"{package.removesuffix('/msg')}.msg"), name)
 
 

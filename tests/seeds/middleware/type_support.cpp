@@ -14,10 +14,9 @@ using Bytes = std::vector<std::byte>;
 constexpr rosidl_message_type_support_t kMessage{};
 constexpr rosidl_service_type_support_t kService{};
 
-constexpr CallTypeSupport::Message kOfAnyType{
-    .type = &kMessage,
-    .create = []() -> void* { return new Bytes; },
-    .destroy = [](void* bytes) { delete static_cast<Bytes*>(bytes); }};
+constexpr MessageFunctions kOfAnyType{.type = &kMessage,
+                                      .create = []() -> void* { return new Bytes; },
+                                      .destroy = [](void* bytes) { delete static_cast<Bytes*>(bytes); }};
 
 }  // namespace
 

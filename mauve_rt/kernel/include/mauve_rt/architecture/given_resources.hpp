@@ -4,6 +4,8 @@
 
 #include <tuple>
 
+#include "mauve_rt/data/action_client.hpp"
+#include "mauve_rt/data/action_server.hpp"
 #include "mauve_rt/data/client.hpp"
 #include "mauve_rt/data/event_counter.hpp"
 #include "mauve_rt/data/latest_value.hpp"
@@ -13,8 +15,8 @@
 
 namespace mauve {
 
-/// Each has describe(), and make(): a template for those of a data type, or of a type of calls; else it gets the type.
-using GivenResources =
-    std::tuple<SharedDataKind, RingBufferKind, LatestValueKind, EventKind, ClientKind, TransformTreeKind>;
+/// Each has describe(), and make(): a template for those of a data type, or of a type of calls or actions; else it gets the type.
+using GivenResources = std::tuple<SharedDataKind, RingBufferKind, LatestValueKind, EventKind, ClientKind,
+                                  ActionServerKind, ActionClientKind, TransformTreeKind>;
 
 }  // namespace mauve

@@ -147,6 +147,16 @@ class PluginRegistry {
     add_given<S>(std::string(CallTraits<S>::name));
   }
 
+  /// The type of a ROS action: makes its servers and clients possible, and ports of its parts by name.
+  template <DescribedAction A>
+  void action_type() {
+    type<typename A::Goal>();
+    type<typename A::Result>();
+    type<typename A::Feedback>();
+    const LockGuard lock(mutex_);
+    add_given<A>(std::string(ActionTraits<A>::name));
+  }
+
   // The same with a factory, for parts that are no C++ class of their own. `classes`: as of classes_of().
 
   void add_shell(const std::string& name, std::function<std::unique_ptr<Shell>()> factory,
@@ -188,7 +198,7 @@ class PluginRegistry {
   std::size_t value_bytes(const std::string& type, const ResourceParameters& given) const;
   /// The sequences of a registered data type, whose capacities its resources need: sequence_paths(). Empty when it is none.
   std::vector<std::string> sequences(const std::string& type) const;
-  /// Registered names of "shell", "core", "fsm", "resource", "type" or "call_type", sorted. Throws Error
+  /// Registered names of "shell", "core", "fsm", "resource", "type", "call_type" or "action_type", sorted. Throws Error
   /// (invalid_argument).
   std::vector<std::string> names(const std::string& kind) const;
 
@@ -239,7 +249,7 @@ class PluginRegistry {
   void add(std::map<std::string, Made> PluginRegistry::* entries, const std::string& name,
            const std::string& shown, Made entry);
 
-  /// Every given kind that can be of the type, of data or of calls; false: it was registered before.
+  /// Every given kind that can be of the type, of data, calls or actions; false: it was registered before.
   template <typename Type>
   bool add_given(const std::string& type) {
     return std::apply([&](auto... kinds) { return ((add_given<Type>(kinds, type) ? 1U : 0U) | ...) != 0U; },

@@ -22,6 +22,8 @@
 
 namespace mauve {
 
+class ActionClientBase;
+class ActionServerBase;
 class ClientBase;
 
 /// Tells one waiting thread that some published resource was written.
@@ -252,6 +254,9 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
 
   /// What it is seen from those who carry its calls; nullptr: no client. [rt]
   virtual ClientBase* client() MAUVE_RT { return nullptr; }
+  /// What it is seen from those who carry its goals; nullptr: no such kind. [rt]
+  virtual ActionServerBase* action_server() MAUVE_RT { return nullptr; }
+  virtual ActionClientBase* action_client() MAUVE_RT { return nullptr; }
 
  protected:
   /// Lines of this resource, also those of its services on the threads of components. [rt]

@@ -2,12 +2,15 @@
 // What a kind of resource tells of itself; files, requests and their checks know of it what stands here.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
+#include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/base/value.hpp"
 
 namespace mauve {
@@ -28,7 +31,13 @@ struct ResourceParameter {
 };
 
 /// Whose types a resource may be of.
-enum class TypeNeed : std::uint8_t { none, data, call };
+enum class TypeNeed : std::uint8_t { none, data, call, action };
+
+/// As PluginRegistry::names() has these types; "": it has none. [rt]
+constexpr std::string_view to_string(TypeNeed need) MAUVE_RT {
+  constexpr std::array<std::string_view, 4> kNames{"", "type", "call_type", "action_type"};
+  return kNames[static_cast<std::size_t>(need)];
+}
 
 struct ResourceKind {
   std::string name;

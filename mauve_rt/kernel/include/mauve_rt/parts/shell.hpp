@@ -12,6 +12,7 @@
 #include "mauve_rt/base/rt.hpp"
 #include "mauve_rt/data/call_type.hpp"
 #include "mauve_rt/data/port.hpp"
+#include "mauve_rt/parts/action_ports.hpp"
 #include "mauve_rt/parts/component_part.hpp"
 #include "mauve_rt/parts/property.hpp"
 
@@ -65,6 +66,23 @@ class Shell : public ComponentPart<Shell> {
   template <DescribedCall S>
   CallPort<CallOf<S>>& call_port(std::string name) {
     return call_port<CallOf<S>>(std::move(name), std::string(CallTraits<S>::name));
+  }
+  /// The ports of a component that executes goals of an action, NAME_status ... NAME_result, or sends them.
+  template <DescribedAction A>
+  ActionServerPorts<A> action_server(const std::string& name) {
+    return {.status = read_port<ActionGoal>(name + "_status"),
+            .goal = read_port<typename A::Goal>(name + "_goal"),
+            .decide = write_port<ActionGoal>(name + "_decide"),
+            .feedback = write_port<typename A::Feedback>(name + "_feedback"),
+            .result = write_port<typename A::Result>(name + "_result")};
+  }
+  template <DescribedAction A>
+  ActionClientPorts<A> action_client(const std::string& name) {
+    return {.goal = write_port<typename A::Goal>(name + "_goal"),
+            .decide = write_port<ActionGoal>(name + "_decide"),
+            .status = read_port<ActionGoal>(name + "_status"),
+            .feedback = read_port<typename A::Feedback>(name + "_feedback"),
+            .result = read_port<typename A::Result>(name + "_result")};
   }
   /// A port whose type is known at run time only.
   PortBase& add_port(std::unique_ptr<PortBase> port) { return add(ports_, std::move(port)); }

@@ -1,0 +1,470 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "actions.hpp"
+
+#include <rcl_action/wait.h>
+#include <rcutils/time.h>
+
+#include <algorithm>
+#include <cstring>
+#include <random>
+
+#include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/seam/guards.hpp"
+#include "mauve_rt/base/time.hpp"
+
+#include "rcl_error.hpp"
+
+namespace mauve::bridge {
+
+namespace {
+
+constexpr int kActionRequestsAtOnce = 64;       // of one kind before the others have their turn
+constexpr std::size_t kGoalRequests = 100;      // that the middleware keeps until they are taken
+constexpr std::size_t kResultRequests = 64;     // that wait for the result of one goal; more get no answer
+constexpr time_ns_t kServerEvery = s_to_ns(1);  // so often it is looked whether the server is still there
+constexpr time_ns_t kServerGone = s_to_ns(3);   // so long it may be unseen: discovery has gaps
+
+// How the C structs of all types begin that rosidl makes for an action.
+struct IdFirst {  // SendGoal_Request, GetResult_Request, FeedbackMessage
+  std::uint8_t id[16];
+};
+struct SendGoalResponse {
+  bool accepted;
+  builtin_interfaces__msg__Time stamp;
+};
+
+std::string described(const ActionSettings& settings) {
+  return "resource " + settings.resource + ", action " + settings.name;
+}
+
+GoalId id_of(const std::uint8_t* bytes) {
+  GoalId id{};
+  std::copy_n(bytes, id.size(), id.begin());
+  return id;
+}
+GoalId id_of(const TypedMessage& message) { return id_of(message.as<IdFirst>().id); }
+GoalId id_of(const rcl_action_goal_info_t& goal) { return id_of(goal.goal_id.uuid); }
+
+/// Expanded and remapped, for reports: rcl does so with the name of each topic and service of an action.
+std::string full_name(const rcl_node_t& node, const std::string& name) {
+  char* resolved = nullptr;
+  const rcl_allocator_t allocator = rcl_get_default_allocator();
+  if (!went_well(rcl_node_resolve_name(&node, name.c_str(), allocator, false, false, &resolved))) return name;
+  std::string full = resolved;
+  allocator.deallocate(resolved, allocator.state);
+  return full;
+}
+
+builtin_interfaces__msg__Time stamp_now() {
+  rcutils_time_point_value_t now_ns = 0;
+  went_well(rcutils_system_time_now(&now_ns));
+  return {.sec = static_cast<std::int32_t>(now_ns / s_to_ns(1)),
+          .nanosec = static_cast<std::uint32_t>(now_ns % s_to_ns(1))};
+}
+
+rcl_action_goal_info_t info_of(const GoalId& id) {
+  rcl_action_goal_info_t info = rcl_action_get_zero_initialized_goal_info();
+  std::copy(id.begin(), id.end(), info.goal_id.uuid);
+  info.stamp = stamp_now();
+  return info;
+}
+
+/// A random one, as RFC 9562 marks it.
+GoalId random_id() {
+  static std::random_device device;
+  GoalId id{};
+  for (std::uint8_t& byte : id) byte = static_cast<std::uint8_t>(device());
+  id[6] = static_cast<std::uint8_t>((id[6] & 0x0FU) | 0x40U);
+  id[8] = static_cast<std::uint8_t>((id[8] & 0x3FU) | 0x80U);
+  return id;
+}
+
+[[noreturn]] void throw_other_kind(const Resource& resource, const ActionSettings& settings,
+                                   const char* kind) {
+  throw Error(ErrorCode::type_mismatch, "the resource has no goals of that action",
+              {.element = "resource " + resource.name(),
+               .expected = std::string("a resource of kind ") + kind + " and type " + settings.type,
+               .found = "kind " + resource.kind() + ", type " + resource.type()});
+}
+
+}  // namespace
+
+SteadyClock::SteadyClock() {
+  rcl_allocator_t allocator = rcl_get_default_allocator();
+  check(rcl_clock_init(RCL_STEADY_TIME, &clock_, &allocator), "there is no steady clock", "action");
+}
+SteadyClock::~SteadyClock() { went_well(rcl_clock_fini(&clock_)); }
+
+// ---- a server
+
+OfferedAction::OfferedAction(rcl_node_t& node, const ActionSettings& settings)
+    : Binding(settings.resource),
+      settings_(settings),
+      type_(action_type_support(settings.type)),
+      name_(full_name(node, settings.name)),
+      entity_(node, rcl_action_get_zero_initialized_server()),
+      goal_request_(type_.goal_request),
+      goal_response_(type_.goal_response),
+      result_request_(type_.result_request),
+      result_response_(type_.result_response),
+      feedback_(type_.feedback) {
+  rcl_action_server_options_t options = rcl_action_server_get_default_options();
+  options.goal_service_qos.depth = kGoalRequests;
+  check(rcl_action_server_init(entity_.get(), &node, clock_.get(), type_.action, settings.name.c_str(),
+                               &options),
+        "the action cannot be offered", described(settings));
+  OwnedMessage unknown;
+  if (result_response_.serialize(unknown)) unknown_.assign(unknown.bytes().begin(), unknown.bytes().end());
+}
+
+void OfferedAction::attach(std::shared_ptr<Resource> resource) {
+  if (resource->action_server() == nullptr || resource->type() != settings_.type)
+    throw_other_kind(*resource, settings_, "action_server");
+  Binding::attach(std::move(resource));
+  server_ = this->resource().action_server();
+}
+
+void OfferedAction::end() { server_->close(monotonic_now_ns()); }
+
+std::vector<Arrival*> OfferedAction::arrivals(Lane lane) {
+  return lane == Lane::requests ? std::vector<Arrival*>{this} : std::vector<Arrival*>{};
+}
+
+time_ns_t OfferedAction::next_look_ns() const { return server_->look(monotonic_now_ns()); }
+
+void OfferedAction::join(rcl_wait_set_t& set) {
+  went_well(rcl_action_wait_set_add_action_server(&set, entity_.get(), nullptr));
+}
+
+bool OfferedAction::has_arrived(const rcl_wait_set_t& set) const {
+  bool goal = false, cancel = false, result = false, expired = false;
+  return went_well(rcl_action_server_wait_set_get_entities_ready(&set, entity_.get(), &goal, &cancel, &result,
+                                                                 &expired)) &&
+         (goal || cancel || result || expired);
+}
+
+void OfferedAction::take() {
+  take_goals();
+  take_cancels();
+  take_results();
+  forget_expired();
+}
+
+void OfferedAction::take_goals() {
+  for (int taken = 0; taken < kActionRequestsAtOnce; ++taken) {
+    const LockGuard lock(mutex_);
+    rmw_request_id_t asked{};
+    if (!went_well(rcl_action_take_goal_request(entity_.get(), &asked, goal_request_.get()))) return;
+    GoalId id = id_of(goal_request_);
+    // Who sends may hear of the goal before it is noted: it waits for the mutex.
+    const bool waits = !goals_.contains(id) && goal_request_.serialize(incoming_) &&
+                       server_->ask(incoming_.bytes(), id, monotonic_now_ns()) == GoalReason::none;
+    if (waits) {
+      goals_[id].asked = asked;
+    } else {
+      answer(asked, false);
+    }
+  }
+}
+
+void OfferedAction::answer(const rmw_request_id_t& asked, bool is_accepted) {
+  goal_response_.as<SendGoalResponse>() = {.accepted = is_accepted, .stamp = stamp_now()};
+  rmw_request_id_t id = asked;
+  went_well(rcl_action_send_goal_response(entity_.get(), &id, goal_response_.get()));
+}
+
+void OfferedAction::take_cancels() {
+  for (int taken = 0; taken < kActionRequestsAtOnce; ++taken) {
+    const LockGuard lock(mutex_);
+    rmw_request_id_t asked{};
+    rcl_action_cancel_request_t request = rcl_action_get_zero_initialized_cancel_request();
+    if (!went_well(rcl_action_take_cancel_request(entity_.get(), &asked, &request))) return;
+    rcl_action_cancel_response_t response = rcl_action_get_zero_initialized_cancel_response();
+    if (!went_well(rcl_action_process_cancel_request(entity_.get(), &request, &response))) continue;
+    auto& canceled = response.msg.goals_canceling;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < canceled.size; ++i) {
+      if (server_->cancel(id_of(canceled.data[i]), monotonic_now_ns()))
+        canceled.data[kept++] = canceled.data[i];
+    }
+    if (kept == 0 && canceled.size != 0)
+      response.msg.return_code = action_msgs__srv__CancelGoal_Response__ERROR_GOAL_TERMINATED;
+    const std::size_t reserved = std::exchange(canceled.size, kept);
+    went_well(rcl_action_send_cancel_response(entity_.get(), &asked, &response.msg));
+    canceled.size = reserved;
+    went_well(rcl_action_cancel_response_fini(&response));
+  }
+}
+
+void OfferedAction::take_results() {
+  for (int taken = 0; taken < kActionRequestsAtOnce; ++taken) {
+    const LockGuard lock(mutex_);
+    rmw_request_id_t asked{};
+    if (!went_well(rcl_action_take_result_request(entity_.get(), &asked, result_request_.get()))) return;
+    const auto found = goals_.find(id_of(result_request_));
+    if (found == goals_.end()) {
+      send_result(asked, unknown_);
+    } else if (!found->second.result.empty()) {
+      send_result(asked, found->second.result);
+    } else if (found->second.results.size() < kResultRequests) {
+      found->second.results.push_back(asked);
+    }
+  }
+}
+
+void OfferedAction::send_result(const rmw_request_id_t& asked, std::vector<std::byte>& result) {
+  rmw_request_id_t id = asked;
+  if (result_response_.deserialize(result))
+    went_well(rcl_action_send_result_response(entity_.get(), &id, result_response_.get()));
+}
+
+void OfferedAction::forget_expired() {
+  const LockGuard lock(mutex_);
+  rcl_action_goal_info_t expired = rcl_action_get_zero_initialized_goal_info();
+  for (std::size_t count = 1;
+       went_well(rcl_action_expire_goals(entity_.get(), &expired, 1, &count)) && count != 0;)
+    goals_.erase(id_of(expired));
+}
+
+bool OfferedAction::send() {
+  GoalNews news;
+  if (!server_->next_news(news, message_)) return false;
+  const LockGuard lock(mutex_);
+  const auto found = goals_.find(news.id);
+  if (found == goals_.end()) return true;
+  if (news.has_feedback) {
+    if (feedback_.deserialize(message_))
+      went_well(rcl_action_publish_feedback(entity_.get(), feedback_.get()));
+  } else if (news.state == GoalState::rejected || !accept(news.id, found->second)) {
+    answer(found->second.asked, false);
+    goals_.erase(found);
+  } else {
+    follow(news, found->second);
+    publish_status();
+  }
+  return true;
+}
+
+/// Unless it was before; false: rcl refuses.
+bool OfferedAction::accept(const GoalId& id, Goal& goal) {
+  if (goal.handle != nullptr) return true;
+  const rcl_action_goal_info_t info = info_of(id);
+  goal.handle = rcl_action_accept_new_goal(entity_.get(), &info);
+  if (goal.handle == nullptr) {
+    rcl_reset_error();
+    return false;
+  }
+  answer(goal.asked, true);
+  return true;
+}
+
+/// By the events that lead there: who looks late has missed states.
+void OfferedAction::follow(const GoalNews& news, Goal& goal) {
+  const auto update = [&](rcl_action_goal_event_t event) {
+    went_well(rcl_action_update_goal_state(goal.handle, event));
+  };
+  rcl_action_goal_state_t state = GOAL_STATE_UNKNOWN;
+  if (!went_well(rcl_action_goal_handle_get_status(goal.handle, &state))) return;
+  const bool is_to_cancel = news.state == GoalState::canceling || news.state == GoalState::canceled;
+  if (is_to_cancel && state != GOAL_STATE_CANCELING) update(GOAL_EVENT_CANCEL_GOAL);
+  if (!is_to_cancel && news.state != GoalState::accepted && state == GOAL_STATE_ACCEPTED)
+    update(GOAL_EVENT_EXECUTE);
+  if (news.state == GoalState::succeeded) update(GOAL_EVENT_SUCCEED);
+  if (news.state == GoalState::aborted) update(GOAL_EVENT_ABORT);
+  if (news.state == GoalState::canceled) update(GOAL_EVENT_CANCELED);
+  if (!news.has_result) return;
+  went_well(rcl_action_notify_goal_done(entity_.get()));
+  goal.result = message_;
+  for (const rmw_request_id_t& asked : std::exchange(goal.results, {})) send_result(asked, goal.result);
+}
+
+void OfferedAction::publish_status() {
+  rcl_action_goal_status_array_t states = rcl_action_get_zero_initialized_goal_status_array();
+  if (!went_well(rcl_action_get_goal_status_array(entity_.get(), &states))) return;
+  went_well(rcl_action_publish_status(entity_.get(), &states.msg));
+  went_well(rcl_action_goal_status_array_fini(&states));
+}
+
+void OfferedAction::report(BridgeReport& report) const {
+  report.actions.push_back({.resource = resource_name(),
+                            .action = name_,
+                            .is_offered = true,
+                            .counts = server_ != nullptr ? server_->counts() : ActionCounts{}});
+}
+
+// ---- a client
+
+CalledAction::CalledAction(rcl_node_t& node, const ActionSettings& settings)
+    : Binding(settings.resource),
+      settings_(settings),
+      node_(node),
+      type_(action_type_support(settings.type)),
+      name_(full_name(node, settings.name)),
+      entity_(node, rcl_action_get_zero_initialized_client()),
+      goal_request_(type_.goal_request),
+      goal_response_(type_.goal_response),
+      result_request_(type_.result_request),
+      result_response_(type_.result_response),
+      feedback_(type_.feedback) {
+  const rcl_action_client_options_t options = rcl_action_client_get_default_options();
+  check(rcl_action_client_init(entity_.get(), &node, type_.action, settings.name.c_str(), &options),
+        "the action cannot be called", described(settings));
+}
+
+CalledAction::~CalledAction() {
+  if (client_ != nullptr) end();
+}
+
+void CalledAction::attach(std::shared_ptr<Resource> resource) {
+  if (resource->action_client() == nullptr || resource->type() != settings_.type)
+    throw_other_kind(*resource, settings_, "action_client");
+  Binding::attach(std::move(resource));
+  client_ = this->resource().action_client();
+}
+
+void CalledAction::end() {
+  send_cancel();
+  if (const std::uint32_t number = client_->open_goal(); number != 0)
+    client_->give_up(number, GoalReason::removed, monotonic_now_ns());
+}
+
+std::vector<Arrival*> CalledAction::arrivals(Lane lane) {
+  return lane == Lane::messages ? std::vector<Arrival*>{this} : std::vector<Arrival*>{};
+}
+
+CalledAction::Goal CalledAction::present() const {
+  const LockGuard lock(mutex_);
+  return goal_;
+}
+
+bool CalledAction::has_server() const {
+  bool is_there = false;
+  return went_well(rcl_action_server_is_available(&node_, entity_.get(), &is_there)) && is_there;
+}
+
+time_ns_t CalledAction::next_look_ns() const {
+  const time_ns_t now_ns = monotonic_now_ns();
+  const time_ns_t answer_ns = client_->look(now_ns);
+  const std::uint32_t number = client_->open_goal();
+  if (number == 0 || has_server()) {
+    unseen_since_ns_ = kForever;
+  } else if (unseen_since_ns_ == kForever) {
+    unseen_since_ns_ = now_ns;
+  } else if (now_ns - unseen_since_ns_ >= kServerGone) {
+    client_->give_up(number, GoalReason::no_server, now_ns);
+  }
+  return number == 0 ? answer_ns : std::min(answer_ns, now_ns + kServerEvery);
+}
+
+bool CalledAction::send() {
+  send_cancel();
+  const GoalId id = random_id();
+  std::uint32_t number = 0;
+  if (!client_->next_goal(id, serialized_, number)) return false;
+  send_goal(id, number);
+  return true;
+}
+
+void CalledAction::send_goal(const GoalId& id, std::uint32_t number) {
+  const auto refuse = [&](GoalReason reason) { client_->give_up(number, reason, monotonic_now_ns()); };
+  if (!has_server()) return refuse(GoalReason::no_server);
+  if (!goal_request_.deserialize(serialized_)) return refuse(GoalReason::malformed);
+  // The answer may come before this returns: it waits for the sequence number.
+  const LockGuard lock(mutex_);
+  goal_ = {.id = id, .number = number};
+  if (!went_well(rcl_action_send_goal_request(entity_.get(), goal_request_.get(), &goal_.asked)))
+    refuse(GoalReason::no_server);
+}
+
+void CalledAction::send_cancel() {
+  std::uint32_t number = 0;
+  if (!client_->next_cancel(number)) return;
+  const LockGuard lock(mutex_);
+  if (number != goal_.number) return;
+  rcl_action_cancel_request_t request = rcl_action_get_zero_initialized_cancel_request();
+  std::copy(goal_.id.begin(), goal_.id.end(), request.goal_info.goal_id.uuid);
+  std::int64_t sequence = 0;
+  went_well(rcl_action_send_cancel_request(entity_.get(), &request, &sequence));
+}
+
+void CalledAction::join(rcl_wait_set_t& set) {
+  went_well(rcl_action_wait_set_add_action_client(&set, entity_.get(), nullptr, nullptr));
+}
+
+bool CalledAction::has_arrived(const rcl_wait_set_t& set) const {
+  bool feedback = false, status = false, goal = false, cancel = false, result = false;
+  return went_well(rcl_action_client_wait_set_get_entities_ready(&set, entity_.get(), &feedback, &status,
+                                                                 &goal, &cancel, &result)) &&
+         (feedback || status || goal || cancel || result);
+}
+
+void CalledAction::take() {
+  take_answers();
+  take_feedback();
+  take_states();
+  take_results();
+  rmw_request_id_t id{};
+  rcl_action_cancel_response_t response = rcl_action_get_zero_initialized_cancel_response();
+  // What it says is seen by the states.
+  while (went_well(rcl_action_take_cancel_response(entity_.get(), &id, &response.msg))) {
+  }
+  action_msgs__srv__CancelGoal_Response__fini(&response.msg);
+}
+
+void CalledAction::take_answers() {
+  rmw_request_id_t id{};
+  while (went_well(rcl_action_take_goal_response(entity_.get(), &id, goal_response_.get()))) {
+    const bool is_accepted = goal_response_.as<SendGoalResponse>().accepted;
+    std::uint32_t number = 0;
+    {
+      const LockGuard lock(mutex_);
+      if (id.sequence_number != goal_.asked) continue;  // of a goal that was given up
+      number = goal_.number;
+      std::copy(goal_.id.begin(), goal_.id.end(), result_request_.as<IdFirst>().id);
+      if (is_accepted)
+        went_well(rcl_action_send_result_request(entity_.get(), result_request_.get(), &goal_.result));
+    }
+    client_->answer(number, is_accepted, monotonic_now_ns());
+  }
+}
+
+void CalledAction::take_feedback() {
+  while (went_well(rcl_action_take_feedback(entity_.get(), feedback_.get()))) {
+    const Goal goal = present();
+    if (id_of(feedback_) == goal.id && feedback_.serialize(incoming_))
+      client_->feed_back(goal.number, incoming_.bytes(), monotonic_now_ns());
+  }
+}
+
+void CalledAction::take_states() {
+  action_msgs__msg__GoalStatusArray states{};
+  if (!action_msgs__msg__GoalStatusArray__init(&states)) return;
+  while (went_well(rcl_action_take_status(entity_.get(), &states))) {
+    const Goal goal = present();
+    for (std::size_t i = 0; i < states.status_list.size; ++i) {
+      const action_msgs__msg__GoalStatus& status = states.status_list.data[i];
+      if (id_of(status.goal_info) == goal.id)
+        client_->set_state(goal.number, static_cast<GoalState>(status.status), monotonic_now_ns());
+    }
+  }
+  action_msgs__msg__GoalStatusArray__fini(&states);
+}
+
+void CalledAction::take_results() {
+  rmw_request_id_t id{};
+  while (went_well(rcl_action_take_result_response(entity_.get(), &id, result_response_.get()))) {
+    const Goal goal = present();
+    if (id.sequence_number == goal.result && result_response_.serialize(incoming_))
+      client_->finish(goal.number, incoming_.bytes(), monotonic_now_ns());
+  }
+}
+
+void CalledAction::report(BridgeReport& report) const {
+  report.actions.push_back({.resource = resource_name(),
+                            .action = name_,
+                            .is_offered = false,
+                            .counts = client_ != nullptr ? client_->counts() : ActionCounts{}});
+}
+
+}  // namespace mauve::bridge

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// Goals between resources and ROS actions, both ways.
+#pragma once
+
+#include <rcl_action/rcl_action.h>
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/data/action_client.hpp"
+#include "mauve_rt/data/action_server.hpp"
+
+#include "binding.hpp"
+#include "owned.hpp"
+#include "type_support.hpp"
+#include "typed_message.hpp"
+
+namespace mauve::bridge {
+
+/// What both directions are made from.
+struct ActionSettings {
+  std::string resource;
+  std::string name;  // as given; rcl expands and remaps it
+  std::string type;  // package/action/Type
+};
+
+/// The clock by which a server forgets results.
+class SteadyClock {
+ public:
+  SteadyClock();
+  ~SteadyClock();
+  SteadyClock(const SteadyClock&) = delete;
+  SteadyClock& operator=(const SteadyClock&) = delete;
+  rcl_clock_t* get() noexcept { return &clock_; }
+
+ private:
+  rcl_clock_t clock_{};
+};
+
+/// Offers a resource of kind action_server as a ROS action.
+///
+/// | member               | used by                                  | under  |
+/// | -------------------- | ---------------------------------------- | ------ |
+/// | entity_, goals_      | who takes requests, who sends            | mutex_ (waiting needs none: rcl keeps the places in the wait set apart) |
+/// | goal_request_ ... result_request_, incoming_ | who takes requests | -      |
+/// | feedback_, message_  | who sends                                | -      |
+/// | goal_response_, result_response_ | both                         | mutex_ |
+class OfferedAction final : public Binding, private Arrival {
+ public:
+  /// Throws Error when the type is not installed or rcl refuses. [non-rt]
+  OfferedAction(rcl_node_t& node, const ActionSettings& settings);
+
+  /// Throws Error (type_mismatch) when the resource is no server of that type. [non-rt]
+  void attach(std::shared_ptr<Resource> resource) override;
+  bool send() override;
+  time_ns_t next_look_ns() const override;
+  void end() override;
+  std::vector<Arrival*> arrivals(Lane lane) override;
+  void report(BridgeReport& report) const override;
+
+ private:
+  /// A goal of a client, until its result is forgotten.
+  struct Goal {
+    rmw_request_id_t asked{};                   // by which request
+    rcl_action_goal_handle_t* handle{nullptr};  // of one that was accepted; rcl owns it
+    std::vector<rmw_request_id_t> results{};    // requests that wait for the result
+    std::vector<std::byte> result{};            // of one that has ended
+  };
+
+  void join(rcl_wait_set_t& set) override;
+  std::size_t entities() const override { return 3; }  // services; and a timer
+  bool has_arrived(const rcl_wait_set_t& set) const override;
+  void take() override;
+  void take_goals();
+  void take_cancels();
+  void take_results();
+  void forget_expired();
+
+  void answer(const rmw_request_id_t& asked, bool is_accepted) MAUVE_REQUIRES(mutex_);
+  bool accept(const GoalId& id, Goal& goal) MAUVE_REQUIRES(mutex_);
+  void follow(const GoalNews& news, Goal& goal) MAUVE_REQUIRES(mutex_);
+  void send_result(const rmw_request_id_t& asked, std::vector<std::byte>& result) MAUVE_REQUIRES(mutex_);
+  void publish_status() MAUVE_REQUIRES(mutex_);
+
+  const ActionSettings settings_;
+  ActionTypeSupport type_;
+  const std::string name_;  // expanded and remapped
+  SteadyClock clock_;
+  Owned<rcl_action_server_t, rcl_action_server_fini> entity_;
+  ActionServerBase* server_{nullptr};
+  PiMutex mutex_;
+  std::map<GoalId, Goal> goals_ MAUVE_GUARDED_BY(mutex_);
+  TypedMessage goal_request_;
+  TypedMessage goal_response_;
+  TypedMessage result_request_;
+  TypedMessage result_response_;
+  TypedMessage feedback_;
+  OwnedMessage incoming_;
+  std::vector<std::byte> message_;
+  std::vector<std::byte> unknown_;  // the result of a goal that is not known
+};
+
+/// Carries a client's goals to a ROS action server, and what becomes of them back.
+///
+/// | member                | written by            | read by       | under  |
+/// | --------------------- | --------------------- | ------------- | ------ |
+/// | goal_                 | who sends             | who receives  | mutex_ |
+/// | goal_request_, serialized_ | who sends        | -             | -      |
+/// | the other messages    | who receives          | -             | -      |
+/// | unseen_since_ns_      | who sends             | -             | -      |
+class CalledAction final : public Binding, private Arrival {
+ public:
+  /// Throws Error when the type is not installed or rcl refuses. [non-rt]
+  CalledAction(rcl_node_t& node, const ActionSettings& settings);
+  ~CalledAction() override;
+
+  /// Throws Error (type_mismatch) when the resource is no client of that type. [non-rt]
+  void attach(std::shared_ptr<Resource> resource) override;
+  bool send() override;
+  time_ns_t next_look_ns() const override;
+  void end() override;
+  std::vector<Arrival*> arrivals(Lane lane) override;
+  void report(BridgeReport& report) const override;
+
+ private:
+  /// The present one, with rcl's numbers of its requests.
+  struct Goal {
+    GoalId id{};
+    std::uint32_t number{0};
+    std::int64_t asked{-1};
+    std::int64_t result{-1};
+  };
+
+  void join(rcl_wait_set_t& set) override;
+  std::size_t entities() const override { return 3; }  // clients; and two subscriptions
+  bool has_arrived(const rcl_wait_set_t& set) const override;
+  void take() override;
+  void take_answers();
+  void take_states();
+  void take_feedback();
+  void take_results();
+  void send_goal(const GoalId& id, std::uint32_t number);
+  void send_cancel();
+  bool has_server() const;
+  Goal present() const;
+
+  const ActionSettings settings_;
+  rcl_node_t& node_;
+  ActionTypeSupport type_;
+  const std::string name_;  // expanded and remapped
+  Owned<rcl_action_client_t, rcl_action_client_fini> entity_;
+  ActionClientBase* client_{nullptr};
+  mutable PiMutex mutex_;
+  Goal goal_ MAUVE_GUARDED_BY(mutex_);
+  TypedMessage goal_request_;
+  TypedMessage goal_response_;
+  TypedMessage result_request_;
+  TypedMessage result_response_;
+  TypedMessage feedback_;
+  std::vector<std::byte> serialized_;
+  OwnedMessage incoming_;
+  mutable time_ns_t unseen_since_ns_{kForever};  // the server
+};
+
+}  // namespace mauve::bridge

@@ -1,0 +1,213 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/data/action_client.hpp"
+
+#include "mauve_rt/base/contract.hpp"
+#include "mauve_rt/base/trace.hpp"
+
+namespace mauve {
+
+ActionClientBase::ActionClientBase(std::string type, time_ns_t answer_ns)
+    : Resource("action_client", std::move(type)), answer_ns_(answer_ns) {
+  MAUVE_EXPECTS(answer_ns >= 1);  // checked with the kind's parameters
+}
+
+void ActionClientBase::set_name(const std::string& name) {
+  Resource::set_name(name);
+  mutex_.set_trace_id(TraceNames::intern(name));
+}
+
+ActionCounts ActionClientBase::counts() const {
+  const LockGuard lock(mutex_);
+  return counts_;
+}
+
+std::uint32_t ActionClientBase::open_goal() const {
+  const LockGuard lock(mutex_);
+  return is_open() ? number_ : 0;
+}
+
+// ---- under mutex_
+
+void ActionClientBase::begin(time_ns_t time_ns) noexcept {
+  ++number_;
+  is_to_send_ = true;
+  is_to_cancel_ = false;
+  due_ns_ = time_ns + answer_ns_;
+  feedback_ = 0;
+  enter(GoalState::unknown, GoalReason::none, time_ns);
+}
+
+void ActionClientBase::enter(GoalState state, GoalReason reason, time_ns_t now_ns) noexcept {
+  state_ = state;
+  reason_ = reason;
+  changed_ns_ = now_ns;
+  ++sequence_;
+  switch (state) {
+    case GoalState::accepted:
+      ++counts_.accepted;
+      break;
+    case GoalState::succeeded:
+      ++counts_.succeeded;
+      break;
+    case GoalState::canceled:
+      ++counts_.canceled;
+      break;
+    case GoalState::aborted:
+      ++counts_.aborted;
+      break;
+    case GoalState::rejected:
+      ++counts_.rejected;
+      break;
+    default:
+      break;
+  }
+  if (reason != GoalReason::none)
+    log().warn("goal {} is {}: {}", number_, to_string(state), to_string(reason));
+}
+
+void ActionClientBase::cancel_locked(time_ns_t time_ns) noexcept {
+  if (!floor_.admits(time_ns) || !is_open()) return;
+  if (is_to_send_) {  // nobody has it yet
+    is_to_send_ = false;
+    enter(GoalState::canceled, GoalReason::none, time_ns);
+    return;
+  }
+  is_to_cancel_ = true;
+}
+
+// ---- who carries goals
+
+bool ActionClientBase::next_goal(const GoalId& id, std::vector<std::byte>& request, std::uint32_t& number) {
+  {
+    const LockGuard lock(mutex_);
+    if (!is_to_send_) return false;
+    is_to_send_ = false;
+    number = number_;
+    copy_goal();
+  }
+  put_goal(id, request);
+  return true;
+}
+
+bool ActionClientBase::next_cancel(std::uint32_t& number) {
+  const LockGuard lock(mutex_);
+  if (!is_to_cancel_ || !is_open() || state_ == GoalState::unknown) return false;
+  is_to_cancel_ = false;
+  number = number_;
+  return true;
+}
+
+void ActionClientBase::answer(std::uint32_t number, bool is_accepted, time_ns_t now_ns) {
+  {
+    const LockGuard lock(mutex_);
+    if (!is_present(number) || state_ != GoalState::unknown) return;
+    enter(is_accepted ? GoalState::accepted : GoalState::rejected, GoalReason::none, now_ns);
+  }
+  written(now_ns);
+}
+
+void ActionClientBase::set_state(std::uint32_t number, GoalState state, time_ns_t now_ns) {
+  {
+    const LockGuard lock(mutex_);
+    if (!is_present(number) || state_ == GoalState::unknown || state_ == state || is_final(state) ||
+        state == GoalState::unknown || state == GoalState::accepted)
+      return;
+    enter(state, GoalReason::none, now_ns);
+  }
+  written(now_ns);
+}
+
+void ActionClientBase::feed_back(std::uint32_t number, std::span<const std::byte> feedback,
+                                 time_ns_t now_ns) {
+  if (!take_in_feedback(feedback)) return give_up(number, GoalReason::malformed, now_ns);
+  {
+    const LockGuard lock(mutex_);
+    if (!is_present(number)) return;
+    keep_feedback();
+    feedback_ = ++fed_back_;
+    feedback_ns_ = now_ns;
+  }
+  written(now_ns);
+}
+
+void ActionClientBase::finish(std::uint32_t number, std::span<const std::byte> response, time_ns_t now_ns) {
+  std::int8_t ended = 0;
+  if (!take_in_result(response, ended)) return give_up(number, GoalReason::malformed, now_ns);
+  const auto state = static_cast<GoalState>(ended);
+  if (state < GoalState::succeeded || state > GoalState::aborted)  // it does not know the goal
+    return give_up(number, GoalReason::no_server, now_ns);
+  {
+    const LockGuard lock(mutex_);
+    if (!is_present(number)) return;
+    keep_result();
+    result_of_ = number;
+    enter(state, GoalReason::none, now_ns);
+  }
+  written(now_ns);
+}
+
+void ActionClientBase::give_up(std::uint32_t number, GoalReason reason, time_ns_t now_ns) {
+  {
+    const LockGuard lock(mutex_);
+    if (!is_present(number)) return;
+    enter(state_ == GoalState::unknown ? GoalState::rejected : GoalState::aborted, reason, now_ns);
+  }
+  written(now_ns);
+}
+
+time_ns_t ActionClientBase::look(time_ns_t now_ns) {
+  {
+    const LockGuard lock(mutex_);
+    if (!is_open() || state_ != GoalState::unknown) return kForever;
+    if (now_ns < due_ns_) return due_ns_;
+    is_to_send_ = false;
+    enter(GoalState::rejected, GoalReason::no_answer, now_ns);
+  }
+  written(now_ns);
+  return kForever;
+}
+
+// ---- the component
+
+bool ActionClientBase::ask_to_cancel(time_ns_t time_ns) noexcept {
+  {
+    const LockGuard lock(mutex_);
+    cancel_locked(time_ns);
+  }
+  notify();
+  return true;
+}
+
+TryWrite ActionClientBase::try_ask_to_cancel(time_ns_t time_ns) noexcept {
+  {
+    if (!mutex_.try_lock()) return TryWrite::busy;
+    const LockGuard lock(mutex_, std::adopt_lock);
+    cancel_locked(time_ns);
+  }
+  notify();
+  return TryWrite::done;
+}
+
+DataStatus ActionClientBase::read_status(ActionGoal& status, time_ns_t& time_ns,
+                                         ReaderState& reader) noexcept {
+  const LockGuard lock(mutex_);
+  if (number_ == 0) return DataStatus::none;
+  status = {.number = number_,
+            .state = static_cast<std::uint8_t>(state_),
+            .reason = static_cast<std::uint8_t>(reason_)};
+  time_ns = changed_ns_;
+  return reader.look(sequence_);
+}
+
+ResourceKind ActionClientKind::describe() {
+  return {.name = "action_client",
+          .parameters = {{.name = "answer_ns",
+                          .initial = s_to_ns(1),
+                          .description = "a goal that the server has not answered by then is rejected",
+                          .unit = "ns",
+                          .minimum = 1,
+                          .file_key = "action.answer_ms"}},
+          .type = TypeNeed::action};
+}
+
+}  // namespace mauve

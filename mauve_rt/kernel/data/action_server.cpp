@@ -1,0 +1,359 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+#include "mauve_rt/data/action_server.hpp"
+
+#include <algorithm>
+
+#include "mauve_rt/base/error.hpp"
+#include "mauve_rt/base/trace.hpp"
+
+namespace mauve {
+
+namespace {
+
+constexpr time_ns_t kServedEvery = ms_to_ns(100);  // so often it is looked whether a component still serves
+constexpr std::size_t kEndedGoals = 2;             // places for goals that have ended, and were not told yet
+
+/// Whether a component may take a goal from one state to the other.
+bool fits(GoalState from, GoalState to) noexcept {
+  switch (to) {
+    case GoalState::accepted:
+    case GoalState::rejected:
+      return from == GoalState::unknown;
+    case GoalState::succeeded:
+      return from == GoalState::executing || from == GoalState::canceling;
+    case GoalState::canceled:
+      return from == GoalState::canceling;
+    case GoalState::aborted:
+      return from == GoalState::accepted || from == GoalState::executing || from == GoalState::canceling;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+std::string_view to_string(GoalState state) noexcept {
+  constexpr std::array<std::string_view, 8> kNames{"unknown",   "accepted", "executing", "canceling",
+                                                   "succeeded", "canceled", "aborted",   "rejected"};
+  const auto index = static_cast<std::size_t>(state);
+  return index < kNames.size() ? kNames[index] : "unknown";
+}
+
+std::string_view to_string(GoalReason reason) noexcept {
+  switch (reason) {
+    case GoalReason::none:
+      return "";
+    case GoalReason::stopped:
+      return "the component was stopped";
+    case GoalReason::removed:
+      return "the component or the action was removed";
+    case GoalReason::no_answer:
+      return "no answer came in time";
+    case GoalReason::full:
+      return "there are as many goals as allowed";
+    case GoalReason::no_server:
+      return "nobody serves the action";
+    case GoalReason::malformed:
+      return "the message does not fit the type";
+  }
+  return "";
+}
+
+ActionServerBase::ActionServerBase(std::string type, std::int64_t goals, time_ns_t answer_ns)
+    : Resource("action_server", std::move(type)),
+      goals_(static_cast<std::size_t>(goals)),
+      answer_ns_(answer_ns),
+      places_(2 * goals_ + kEndedGoals) {
+  MAUVE_EXPECTS(goals >= 1 && goals <= kMostGoals && answer_ns >= 1);  // checked with the kind's parameters
+}
+
+void ActionServerBase::set_name(const std::string& name) {
+  Resource::set_name(name);
+  mutex_.set_trace_id(TraceNames::intern(name));
+}
+
+ActionCounts ActionServerBase::counts() const {
+  const LockGuard lock(mutex_);
+  return counts_;
+}
+
+// ---- places, under mutex_
+
+std::size_t ActionServerBase::oldest(GoalState state) const noexcept {
+  std::size_t found = kNone;
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const Place& place = places_[i];
+    if (place.is_used && place.state == state && (found == kNone || place.number < places_[found].number))
+      found = i;
+  }
+  return found;
+}
+
+std::size_t ActionServerBase::find(const GoalId& id) const noexcept {
+  const auto found = std::find_if(places_.begin(), places_.end(),
+                                  [&](const Place& place) { return place.is_used && place.id == id; });
+  return found == places_.end() ? kNone : static_cast<std::size_t>(found - places_.begin());
+}
+
+std::size_t ActionServerBase::find(std::uint32_t number) const noexcept {
+  const auto found = std::find_if(places_.begin(), places_.end(), [&](const Place& place) {
+    return place.is_used && place.number == number;
+  });
+  return found == places_.end() ? kNone : static_cast<std::size_t>(found - places_.begin());
+}
+
+std::size_t ActionServerBase::open_goals() const noexcept {
+  return static_cast<std::size_t>(std::count_if(places_.begin(), places_.end(), [](const Place& place) {
+    return place.is_used && !is_final(place.state);
+  }));
+}
+
+void ActionServerBase::accept(std::size_t place, time_ns_t now_ns) noexcept {
+  places_[place].state = GoalState::accepted;
+  ++counts_.accepted;
+  changed(now_ns);
+  if (current_ == kNone) begin_next(now_ns);
+}
+
+void ActionServerBase::begin_next(time_ns_t now_ns) noexcept {
+  current_ = oldest(GoalState::accepted);
+  if (current_ == kNone) return;
+  places_[current_].state = GoalState::executing;
+  places_[current_].since_ns = now_ns;
+}
+
+void ActionServerBase::end(std::size_t place, GoalState state, GoalReason reason, time_ns_t now_ns) noexcept {
+  Place& goal = places_[place];
+  goal.state = state;
+  goal.reason = reason;
+  std::uint64_t& count = state == GoalState::succeeded  ? counts_.succeeded
+                         : state == GoalState::canceled ? counts_.canceled
+                         : state == GoalState::aborted  ? counts_.aborted
+                                                        : counts_.rejected;
+  ++count;
+  changed(now_ns);
+  if (reason != GoalReason::none)
+    log().warn("goal {} is {}: {}", goal.number, to_string(state), to_string(reason));
+  if (place != current_) return;
+  keep_result(place);
+  has_feedback_ = false;
+  current_ = kNone;
+}
+
+void ActionServerBase::end_all(GoalReason reason, time_ns_t now_ns) noexcept {
+  for (std::size_t i = 0; i < places_.size(); ++i) {
+    const Place& place = places_[i];
+    if (!place.is_used || is_final(place.state)) continue;
+    end(i, place.state == GoalState::unknown ? GoalState::rejected : GoalState::aborted, reason, now_ns);
+  }
+}
+
+void ActionServerBase::changed(time_ns_t now_ns) noexcept {
+  ++sequence_;
+  changed_ns_ = now_ns;
+}
+
+// ---- who carries goals
+
+GoalReason ActionServerBase::ask(std::span<const std::byte> request, GoalId& id, time_ns_t now_ns) {
+  if (!take_in(request, id)) return GoalReason::malformed;
+  {
+    const LockGuard lock(mutex_);
+    const auto room =
+        std::find_if(places_.begin(), places_.end(), [](const Place& place) { return !place.is_used; });
+    GoalReason refused = GoalReason::none;
+    if (!is_served()) {
+      refused = GoalReason::no_server;
+    } else if (open_goals() >= goals_ || room == places_.end() || find(id) != kNone) {
+      refused = GoalReason::full;
+    }
+    if (refused != GoalReason::none) {
+      ++counts_.rejected;
+      return refused;
+    }
+    *room = {.is_used = true,
+             .id = id,
+             .number = next_number_++,
+             .due_ns = now_ns + answer_ns_,
+             .since_ns = now_ns};
+    keep_goal(static_cast<std::size_t>(room - places_.begin()));
+    changed(now_ns);
+  }
+  written(now_ns);
+  return GoalReason::none;
+}
+
+bool ActionServerBase::cancel(const GoalId& id, time_ns_t now_ns) {
+  {
+    const LockGuard lock(mutex_);
+    const std::size_t place = find(id);
+    if (place == kNone || places_[place].state == GoalState::unknown || is_final(places_[place].state))
+      return false;
+    if (place == current_) {
+      places_[place].state = GoalState::canceling;
+      changed(now_ns);
+    } else {
+      end(place, GoalState::canceled, GoalReason::none, now_ns);
+    }
+  }
+  written(now_ns);
+  return true;
+}
+
+bool ActionServerBase::next_news(GoalNews& news, std::vector<std::byte>& message) {
+  {
+    const LockGuard lock(mutex_);
+    std::size_t found = kNone;
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      const Place& place = places_[i];
+      const bool is_news = place.is_used && (place.state != place.told || (i == current_ && has_feedback_));
+      if (is_news && (found == kNone || place.number < places_[found].number)) found = i;
+    }
+    if (found == kNone) return false;
+    Place& place = places_[found];
+    const bool is_other = place.state != place.told;
+    news = {.id = place.id,
+            .number = place.number,
+            .state = place.state,
+            .reason = place.reason,
+            .has_feedback = !is_other,
+            .has_result = is_other && is_final(place.state)};
+    place.told = place.state;
+    if (news.has_feedback) {
+      has_feedback_ = false;
+      copy_feedback();
+    }
+    if (news.has_result) {
+      copy_result(found);
+      place.is_used = false;
+    }
+  }
+  if (news.has_feedback) put_feedback(news.id, message);
+  if (news.has_result) put_result(news.state, message);
+  return true;
+}
+
+time_ns_t ActionServerBase::look(time_ns_t now_ns) {
+  time_ns_t next_ns = kForever;
+  bool has_ended = false;
+  {
+    const LockGuard lock(mutex_);
+    if (open_goals() == 0) return kForever;
+    if (!is_served()) {
+      end_all(GoalReason::removed, now_ns);
+      has_ended = true;
+    }
+    for (std::size_t i = 0; i < places_.size(); ++i) {
+      const Place& place = places_[i];
+      if (!place.is_used || place.state != GoalState::unknown) continue;
+      if (place.due_ns <= now_ns) {
+        end(i, GoalState::rejected, GoalReason::no_answer, now_ns);
+        has_ended = true;
+      } else {
+        next_ns = std::min(next_ns, place.due_ns);
+      }
+    }
+    if (open_goals() != 0) next_ns = std::min(next_ns, now_ns + kServedEvery);
+  }
+  if (has_ended) written(now_ns);
+  return next_ns;
+}
+
+void ActionServerBase::close(time_ns_t now_ns) {
+  {
+    const LockGuard lock(mutex_);
+    end_all(GoalReason::removed, now_ns);
+  }
+  written(now_ns);
+}
+
+// ---- the component
+
+DataStatus ActionServerBase::read_status(ActionGoal& status, time_ns_t& time_ns,
+                                         ReaderState& reader) noexcept {
+  bool has_accepted = false;
+  DataStatus found{};
+  {
+    const LockGuard lock(mutex_);
+    if (!has_judge()) {
+      for (std::size_t next = oldest(GoalState::unknown); next != kNone; next = oldest(GoalState::unknown)) {
+        accept(next, places_[next].since_ns);
+        has_accepted = true;
+      }
+    }
+    const std::size_t asked = oldest(GoalState::unknown);
+    status = {.asked = asked == kNone ? 0 : places_[asked].number};
+    if (current_ != kNone) {
+      status.number = places_[current_].number;
+      status.state = static_cast<std::uint8_t>(places_[current_].state);
+    }
+    for (const Place& place : places_)
+      status.waiting += place.is_used && place.state == GoalState::accepted ? 1U : 0U;
+    time_ns = changed_ns_;
+    found = reader.look(sequence_);
+  }
+  if (has_accepted) notify();
+  return found;
+}
+
+bool ActionServerBase::decide(const ActionGoal& decision, time_ns_t time_ns) noexcept {
+  bool fits = true;
+  {
+    const LockGuard lock(mutex_);
+    fits = decide_locked(decision, time_ns);
+  }
+  notify();
+  return fits;
+}
+
+TryWrite ActionServerBase::try_decide(const ActionGoal& decision, time_ns_t time_ns) noexcept {
+  {
+    if (!mutex_.try_lock()) return TryWrite::busy;
+    const LockGuard lock(mutex_, std::adopt_lock);
+    decide_locked(decision, time_ns);
+  }
+  notify();
+  return TryWrite::done;
+}
+
+bool ActionServerBase::decide_locked(const ActionGoal& decision, time_ns_t time_ns) noexcept {
+  if (!floor_.admits(time_ns)) return true;
+  const GoalState state = decision.its_state();
+  if (state == GoalState::unknown) {
+    end_all(GoalReason::stopped, time_ns);
+    return true;
+  }
+  const bool is_answer = state == GoalState::accepted || state == GoalState::rejected;
+  const std::size_t meant = is_answer ? oldest(GoalState::unknown) : current_;
+  const std::size_t place = decision.number == 0 ? meant : find(decision.number);
+  if (place == kNone || !fits(places_[place].state, state)) {
+    ++counts_.refused;
+    return false;
+  }
+  if (state == GoalState::accepted) {
+    accept(place, time_ns);
+  } else {
+    end(place, state, GoalReason::none, time_ns);
+    if (current_ == kNone) begin_next(time_ns);
+  }
+  return true;
+}
+
+ResourceKind ActionServerKind::describe() {
+  return {
+      .name = "action_server",
+      .parameters = {{.name = "goals",
+                      .initial = std::int64_t{1},
+                      .description = "so many goals at once, the executed one among them; more are rejected",
+                      .minimum = 1,
+                      .maximum = static_cast<double>(kMostGoals)},
+                     {.name = "answer_ns",
+                      .initial = kDefaultAnswerTime,
+                      .description = "a goal that the component has not answered by then is rejected",
+                      .unit = "ns",
+                      .minimum = 1,
+                      .file_key = "action.answer_ms"}},
+      .type = TypeNeed::action};
+}
+
+}  // namespace mauve

@@ -1,0 +1,326 @@
+// SPDX-License-Identifier: LGPL-3.0-or-later
+// ActionServer: a resource whose goals come from outside of the architecture, of a ROS action as a rule.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "mauve_rt/base/pi_mutex.hpp"
+#include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/seam/guards.hpp"
+#include "mauve_rt/base/seam/mutex.hpp"
+#include "mauve_rt/data/action_type.hpp"
+#include "mauve_rt/data/resource.hpp"
+#include "mauve_rt/data/resource_kind.hpp"
+#include "mauve_rt/data/service.hpp"
+
+namespace mauve {
+
+inline constexpr time_ns_t kDefaultAnswerTime = ms_to_ns(100);
+inline constexpr std::int64_t kMostGoals = 64;
+
+/// What became of the goals of a server or a client so far.
+struct ActionCounts {
+  std::uint64_t accepted{0};
+  std::uint64_t rejected{0};
+  std::uint64_t succeeded{0};
+  std::uint64_t canceled{0};
+  std::uint64_t aborted{0};
+  std::uint64_t refused{0};  // decisions of components that fit no goal
+};
+
+/// Another state of a goal, or feedback about it, for who carries them outside.
+struct GoalNews {
+  GoalId id{};
+  std::uint32_t number{0};
+  GoalState state{GoalState::unknown};
+  GoalReason reason{GoalReason::none};
+  bool has_feedback{false};
+  bool has_result{false};  // the state is a final one
+};
+
+/// An action server seen without its type. Its goals are executed one after another: the oldest accepted one is the current one.
+///
+/// Who carries goals puts them in by ask(); the component answers in the declared time, by a read of its status where no port is
+/// connected to `asked`, else by a decision. Whatever ends without the component's decision says why (GoalReason).
+///
+/// | member                | written by                             | read by            | under            |
+/// | --------------------- | -------------------------------------- | ------------------ | ---------------- |
+/// | places_, current_, sequence_, counts_, next_number_ | component, who carries | both      | mutex_           |
+/// | what a derived class keeps of goals, results and feedback | both | both               | mutex_           |
+/// | what it takes in, and hands out | requests' thread; sender's thread | same          | -                |
+/// | floor_                | commits, who deploys                   | component          | its own          |
+///
+/// The wait of a component for an event of this resource ends with each goal that comes, and each cancel.
+class ActionServerBase : public Resource {
+ public:
+  /// `goals`: so many that have not ended. Throws Error (out_of_range): `goals` not in 1 ... kMostGoals, `answer_ns` < 1.
+  ActionServerBase(std::string type, std::int64_t goals, time_ns_t answer_ns);
+
+  ActionServerBase* action_server() noexcept override { return this; }
+  void set_name(const std::string& name) override;
+  /// [non-rt]
+  ActionCounts counts() const;
+
+  // ---- who carries goals; asks and cancels on one thread
+
+  /// A goal comes, as rosidl's <Type>_SendGoal_Request; writes its id. None when it waits for its answer now, else why it is
+  /// rejected at once. [non-rt]
+  GoalReason ask(std::span<const std::byte> request, GoalId& id, time_ns_t now_ns);
+  /// Its client asks to cancel a goal; false: no such goal is accepted and has not ended. [non-rt]
+  bool cancel(const GoalId& id, time_ns_t now_ns);
+
+  // ---- the same, on one thread
+
+  /// What is to be told of a goal, the oldest goal first; false: nothing. A final state is given once, then the goal is forgotten.
+  /// `message`: the feedback, as rosidl's <Type>_FeedbackMessage, or of a goal that has ended the <Type>_GetResult_Response.
+  /// [non-rt]
+  bool next_news(GoalNews& news, std::vector<std::byte>& message);
+  /// Ends what took too long, or what no component serves any more; returns when to look again. [non-rt]
+  time_ns_t look(time_ns_t now_ns);
+  /// Who carries goals goes: all end as removed. [non-rt]
+  void close(time_ns_t now_ns);
+
+ protected:
+  /// Whether a port decides about goals, and whether one looks at those that wait for an answer. [rt]
+  virtual bool is_served() const MAUVE_RT = 0;
+  virtual bool has_judge() const MAUVE_RT = 0;
+  /// Reads a request into a place of its own; false: malformed. [non-rt]
+  virtual bool take_in(std::span<const std::byte> request, GoalId& id) = 0;
+  /// Keeps the goal that was taken in; keeps the present result as that goal's, and begins another one. [rt] Under mutex_.
+  virtual void keep_goal(std::size_t place) MAUVE_RT = 0;
+  virtual void keep_result(std::size_t place) MAUVE_RT = 0;
+  /// Copies them to a place of its own. [rt] Under mutex_.
+  virtual void copy_feedback() MAUVE_RT = 0;
+  virtual void copy_result(std::size_t place) MAUVE_RT = 0;
+  /// Those copies as messages. [non-rt]
+  virtual void put_feedback(const GoalId& id, std::vector<std::byte>& message) const = 0;
+  virtual void put_result(GoalState state, std::vector<std::byte>& message) const = 0;
+
+  // ---- the component
+
+  /// As ReadService::read(). `copy` gets the place of the goal, under mutex_. [rt]
+  DataStatus read_status(ActionGoal& status, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
+  template <typename Copy>
+  DataStatus read_goal(Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
+    const LockGuard lock(mutex_);
+    return read_place(current_, copy, time_ns, reader);
+  }
+  template <typename Copy>
+  DataStatus read_asked(Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
+    const LockGuard lock(mutex_);
+    return read_place(oldest(GoalState::unknown), copy, time_ns, reader);
+  }
+  /// As WriteService::write() and try_write(). [rt]
+  bool decide(const ActionGoal& decision, time_ns_t time_ns) MAUVE_RT;
+  TryWrite try_decide(const ActionGoal& decision, time_ns_t time_ns) MAUVE_RT;
+  /// Feedback about the current goal, or its result: `keep` copies it under mutex_. Without a goal nothing happens, nor in a stop. [rt]
+  template <typename Keep>
+  bool give_feedback(Keep keep, time_ns_t time_ns) MAUVE_RT {
+    {
+      const LockGuard lock(mutex_);
+      if (!may_give(time_ns)) return true;
+      keep();
+      has_feedback_ = true;
+    }
+    notify();
+    return true;
+  }
+  template <typename Keep>
+  bool give_result(Keep keep, time_ns_t time_ns) MAUVE_RT {
+    const LockGuard lock(mutex_);
+    if (may_give(time_ns)) keep();
+    return true;
+  }
+  WriteFloor& floor() MAUVE_RT { return floor_; }
+  std::size_t places() const noexcept { return places_.size(); }
+
+ private:
+  static constexpr std::size_t kNone = SIZE_MAX;
+
+  /// A goal, or room for one.
+  struct Place {
+    bool is_used{false};
+    GoalId id{};
+    std::uint32_t number{0};
+    GoalState state{GoalState::unknown};
+    GoalReason reason{GoalReason::none};
+    GoalState told{GoalState::unknown};  // the last one that next_news() gave
+    time_ns_t due_ns{0};                 // to be answered
+    time_ns_t since_ns{0};               // when it came, or became the current one
+  };
+
+  std::size_t oldest(GoalState state) const noexcept;
+  std::size_t find(const GoalId& id) const noexcept;
+  std::size_t find(std::uint32_t number) const noexcept;
+  std::size_t open_goals() const noexcept;
+  bool may_give(time_ns_t time_ns) const noexcept {
+    return current_ != kNone && time_ns > stop_ns() && floor_.admits(time_ns);
+  }
+  void accept(std::size_t place, time_ns_t now_ns) noexcept;
+  void end(std::size_t place, GoalState state, GoalReason reason, time_ns_t now_ns) noexcept;
+  void end_all(GoalReason reason, time_ns_t now_ns) noexcept;
+  void begin_next(time_ns_t now_ns) noexcept;
+  void changed(time_ns_t now_ns) noexcept;
+  bool decide_locked(const ActionGoal& decision, time_ns_t time_ns) noexcept;
+
+  /// [rt]
+  template <typename Copy>
+  DataStatus read_place(std::size_t place, Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
+
+  const std::size_t goals_;
+  const time_ns_t answer_ns_;
+  mutable PiMutex mutex_;
+  WriteFloor floor_;
+  std::vector<Place> places_;
+  std::size_t current_{kNone};
+  bool has_feedback_{false};
+  std::uint32_t next_number_{1};
+  std::uint64_t sequence_{1};
+  time_ns_t changed_ns_{0};
+  ActionCounts counts_;
+};
+
+template <typename Copy>
+DataStatus ActionServerBase::read_place(std::size_t place, Copy copy, time_ns_t& time_ns,
+                                        ReaderState& reader) noexcept {
+  if (place == kNone) return DataStatus::none;
+  copy(place);
+  time_ns = places_[place].since_ns;
+  return reader.look(places_[place].number);
+}
+
+/// Offers `status`, `goal` and `asked` to read, `decide`, `feedback` and `result` to write.
+template <DescribedAction A>
+class ActionServer final : public ActionServerBase {
+ public:
+  using Goal = typename A::Goal;
+  using Result = typename A::Result;
+  using Feedback = typename A::Feedback;
+
+  explicit ActionServer(std::int64_t goals = 1, time_ns_t answer_ns = kDefaultAnswerTime)
+      : ActionServerBase(std::string(ActionTraits<A>::name), goals, answer_ns),
+        goals_(places()),
+        results_(places()) {
+    for (ServiceBase* const service :
+         std::initializer_list<ServiceBase*>{&status, &goal, &asked, &decide, &feedback, &result})
+      offer(*service);
+  }
+
+ protected:
+  bool is_served() const noexcept override { return decide.ports() != 0; }
+  bool has_judge() const noexcept override { return asked.ports() != 0; }
+  bool take_in(std::span<const std::byte> request, GoalId& id) override {
+    CdrReader reader(request);
+    return reader.get(id) && reader.get(*taken_in_);
+  }
+  void keep_goal(std::size_t place) noexcept override {
+    goals_[place] = *taken_in_;
+    results_[place] = {};
+  }
+  void keep_result(std::size_t place) noexcept override { results_[place] = std::exchange(result_, {}); }
+  void copy_feedback() noexcept override { *feedback_out_ = feedback_; }
+  void copy_result(std::size_t place) noexcept override { *result_out_ = results_[place]; }
+  void put_feedback(const GoalId& id, std::vector<std::byte>& message) const override {
+    CdrWriter writer(message);
+    writer.put(id);
+    writer.put(*feedback_out_);
+  }
+  void put_result(GoalState state, std::vector<std::byte>& message) const override {
+    CdrWriter writer(message);
+    writer.put(static_cast<std::int8_t>(state));
+    writer.put(*result_out_);
+  }
+
+ private:
+  /// Of one port: one component serves.
+  template <Described T, DataStatus (ActionServer::*Find)(T&, time_ns_t&, ReaderState&) MAUVE_RT>
+  class Read final : public ReadService<T> {
+   public:
+    Read(ActionServer& owner, const char* name) : ReadService<T>(name), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return 1; }
+    DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      return (owner_.*Find)(value, time_ns, reader);
+    }
+
+   private:
+    ActionServer& owner_;
+  };
+  template <Described T, bool (ActionServer::*Put)(const T&, time_ns_t) MAUVE_RT>
+  class Write : public WriteService<T> {
+   public:
+    Write(ActionServer& owner, const char* name) : WriteService<T>(name), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return 1; }
+    bool write(const T& value, time_ns_t time_ns) noexcept override { return (owner_.*Put)(value, time_ns); }
+    /// Of a stop: `decide` alone says something then.
+    TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept override { return TryWrite::done; }
+    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
+    void forget_floor() noexcept override { owner_.floor().forget(); }
+
+   protected:
+    ActionServer& owner() const noexcept { return owner_; }
+
+   private:
+    ActionServer& owner_;
+  };
+
+  DataStatus find_status(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+    return read_status(value, time_ns, reader);
+  }
+  DataStatus find_goal(Goal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+    return read_goal([&](std::size_t place) noexcept { value = goals_[place]; }, time_ns, reader);
+  }
+  DataStatus find_asked(Goal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+    return read_asked([&](std::size_t place) noexcept { value = goals_[place]; }, time_ns, reader);
+  }
+  bool take_decision(const ActionGoal& decision, time_ns_t time_ns) noexcept {
+    return ActionServerBase::decide(decision, time_ns);
+  }
+  bool take_feedback(const Feedback& value, time_ns_t time_ns) noexcept {
+    return give_feedback([&]() noexcept { feedback_ = value; }, time_ns);
+  }
+  bool take_result(const Result& value, time_ns_t time_ns) noexcept {
+    return give_result([&]() noexcept { result_ = value; }, time_ns);
+  }
+  class Decide final : public Write<ActionGoal, &ActionServer::take_decision> {
+   public:
+    using Write<ActionGoal, &ActionServer::take_decision>::Write;
+    TryWrite try_write(const ActionGoal& decision, time_ns_t time_ns) noexcept override {
+      return this->owner().try_decide(decision, time_ns);
+    }
+  };
+
+  // Under the base's mutex:
+  std::vector<Goal> goals_;      // by place
+  std::vector<Result> results_;  // of goals that have ended
+  Result result_{};              // of the current one
+  Feedback feedback_{};
+  // Of the thread that takes in, and of the one that hands out:
+  std::unique_ptr<Goal> taken_in_{std::make_unique<Goal>()};
+  std::unique_ptr<Result> result_out_{std::make_unique<Result>()};
+  std::unique_ptr<Feedback> feedback_out_{std::make_unique<Feedback>()};
+
+ public:
+  Read<ActionGoal, &ActionServer::find_status> status{*this, "status"};
+  Read<Goal, &ActionServer::find_goal> goal{*this, "goal"};
+  Read<Goal, &ActionServer::find_asked> asked{*this, "asked"};
+  Decide decide{*this, "decide"};
+  Write<Feedback, &ActionServer::take_feedback> feedback{*this, "feedback"};
+  Write<Result, &ActionServer::take_result> result{*this, "result"};
+};
+
+/// As architectures name and make it. All functions [setup].
+struct ActionServerKind {
+  static ResourceKind describe();
+  template <DescribedAction A>
+  static std::unique_ptr<Resource> make(const ResourceParameters& given) {
+    return std::make_unique<ActionServer<A>>(get<std::int64_t>(given, "goals"),
+                                             get<std::int64_t>(given, "answer_ns"));
+  }
+};
+
+}  // namespace mauve
