@@ -198,7 +198,9 @@ TYPED_TEST(OpenChange, OneThatIsLateToAnEpochStartsOnTheLatestOne) {
   this->deploy();
   this->make_late(std::move(Transaction().set_property("late", "gain", 2.0).resynchronise()));
   const time_ns_t first_ns = this->architecture.deployment_epoch_ns();
+  this->pass_time();
   this->commit(Transaction().resynchronise());
+  EXPECT_GT(this->architecture.deployment_epoch_ns(), first_ns);
   this->await_taken();
   EXPECT_EQ(first_ns, this->late->task().grid().reference_ns) << "of the change that it took";
   this->host().stop("late", kLong);

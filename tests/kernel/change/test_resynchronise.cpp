@@ -176,6 +176,14 @@ TYPED_TEST(Resynchronise, LeavesAFaultedOneAloneAndASporadicOneInPlace) {
   EXPECT_EQ(this->epoch_ns(), first.task().grid().reference_ns);
 }
 
+TYPED_TEST(Resynchronise, LiesAheadOfNowAlsoWhereNoComponentTakesIt) {
+  this->deploy();
+  this->host.run_for(ms_to_ns(30));
+  const time_ns_t now_ns = (*this->host).now_ns();
+  this->resynchronise();
+  EXPECT_GE(this->epoch_ns(), now_ns + ms_to_ns(20));
+}
+
 struct RefusingCore : TestCore {
   bool adopt(const CoreBase& /*old*/) override { return false; }
 };
