@@ -297,8 +297,9 @@ TEST_F(ResynchroniseHung, OneThatIsBeingRepairedStartsOnTheNewEpoch) {
   Component& repaired = add("repaired");
   core(repaired).work = [] { throw 42; };
   deploy();
-  wait_until([&] { return repaired.task().is_parked() && repaired.task().state() == ComponentState::faulted; },
-             "the fault");
+  wait_until(
+      [&] { return repaired.task().is_parked() && repaired.task().state() == ComponentState::faulted; },
+      "the fault");
   ASSERT_TRUE(repaired.task().listening().listen(repair, kForever, kForever));
   std::thread requester([&] {
     Transaction transaction;

@@ -113,7 +113,7 @@ struct ChangeSignal {
 /// | queue_place_ ...       | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
 /// | log_ring_              | ordinary threads, no thread of its own| its thread   | thread's creation                  |
-/// | command_mutex_ (PI)    | who starts, commits, ends the thread  | -            | -                                  |
+/// | command_mutex_ (PI)    | who starts, commits, ends the thread, gives an epoch | -            | -                                  |
 /// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
 class Task final : public Waiter {
  public:
