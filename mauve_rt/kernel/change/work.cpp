@@ -501,15 +501,13 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
   throw Error(ErrorCode::adopt_refused, what);
 }
 
-/// One that was late keeps its grid, unless it has faulted or parked since: then it has the new epoch when it starts again.
+/// A component that is late to another change keeps its grid until its next start.
 void TransactionCommit::Work::set_epoch() {
   if (!resynchronises_) return;
   const time_ns_t epoch_ns = later_by(commit_->instant_ns() - 1, kDeploymentLead);
   architecture_.set_deployment_epoch(epoch_ns);
   for (const auto& component : architecture_.components()) {
-    Task& task = component->task();
-    const bool is_at_rest = task.is_parked() || task.state() == ComponentState::faulted;
-    if (is_at_rest && !places_.contains(component->name())) task.join_newer(epoch_ns);
+    if (!places_.contains(component->name())) component->task().join_when_it_starts(epoch_ns);
   }
 }
 

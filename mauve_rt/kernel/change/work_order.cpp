@@ -127,7 +127,8 @@ void TransactionCommit::Work::prepare_lists() {
 
 time_ns_t TransactionCommit::Work::since_ns() const noexcept {
   MAUVE_AUDIT(architecture_.commit_gate().is_looked_at_here());
-  time_ns_t latest_ns = 0;
+  // A new epoch lies ahead of now, also where all components are late, or there is none.
+  time_ns_t latest_ns = resynchronises_ ? MAUVE_RT_TRUSTED(host_->clock().now_ns()) : 0;
   for (const Element& element : elements_)
     latest_ns = std::max(latest_ns, element.component->change_mark().since_ns());
   for (const ServiceBase* service : services_) latest_ns = std::max(latest_ns, service->since_ns());

@@ -44,9 +44,13 @@ void Machine::set_parts(const FsmBase& fsm, CoreBinding* core, time_ns_t period_
 
 time_ns_t Machine::join(time_ns_t epoch_ns) noexcept {
   const time_ns_t first_ns = later_by(epoch_ns, settings_.offset_ns);
-  deployment_ns_.store(first_ns, std::memory_order_relaxed);
-  count_from(std::nullopt);
+  set_deployment(epoch_ns);
+  count_from(first_ns);
   return first_ns;
+}
+
+void Machine::set_deployment(time_ns_t epoch_ns) noexcept {
+  deployment_ns_.store(later_by(epoch_ns, settings_.offset_ns), std::memory_order_relaxed);
 }
 
 void Machine::count_from(std::optional<time_ns_t> reference_ns) noexcept {
@@ -342,7 +346,7 @@ void Machine::delay_event_to(time_ns_t instant_ns) noexcept {
 }
 
 time_ns_t Machine::resynchronise(time_ns_t epoch_ns) noexcept {
-  join(epoch_ns);
+  count_from(later_by(epoch_ns, settings_.offset_ns));
   const Grid now = grid();
   if (now.period_ns == 0 || clock_ns() == kForever) return 0;
   const time_ns_t initial_ns =

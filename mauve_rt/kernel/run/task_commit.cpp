@@ -255,17 +255,34 @@ void Task::join_new_epoch(const Participant& participant) noexcept {
   if (const time_ns_t epoch_ns = participant.new_epoch_ns(); epoch_ns != 0) join_newer(epoch_ns);
 }
 
-/// A take that hung may end after a later epoch was given. Who joins looks afterwards whether a later one has come, so that the last one
-/// to write the grid writes the latest epoch.
-void Task::join_newer(time_ns_t epoch_ns) noexcept {
+/// A take that hung may end after a later epoch was given. Each writer looks afterwards whether a later epoch has come, so that the last
+/// one to write writes the latest epoch.
+void Task::note_newer(time_ns_t epoch_ns, bool moves_grid) noexcept {
   time_ns_t latest = epoch_ns_.load(std::memory_order_relaxed);  // relaxed: the exchange has the last word
   // acq_rel: who finds the later epoch here writes the grid after who has written the earlier one
   while (latest < epoch_ns && !epoch_ns_.compare_exchange_weak(latest, epoch_ns, std::memory_order_acq_rel)) {
   }
   latest = std::max(latest, epoch_ns);
   do {
-    machine_.join(latest);
+    if (moves_grid)
+      machine_.join(latest);
+    else
+      machine_.set_deployment(latest);
   } while (!epoch_ns_.compare_exchange_strong(latest, latest, std::memory_order_acq_rel));
+}
+
+/// The start itself looks for the latest epoch: a visit of the component's thread may make a repaired component STOPPED at any moment.
+void Task::join_when_it_starts(time_ns_t epoch_ns) noexcept {
+  note_newer(epoch_ns, false);
+  // At rest it has the grid at once. Under the lock no start and no change is posted: only a visit could start it, and there is none.
+  if (!command_mutex_.try_lock()) return;
+  const LockGuard lock(command_mutex_, std::adopt_lock);
+  if (claim()) {
+    join_newer(epoch_ns);  // its fallback counts from there
+    give_up_claim();
+  } else if (is_parked() && (slot_.load(std::memory_order_acquire) & kSlot) == kEmpty) {
+    join_newer(epoch_ns);
+  }
 }
 
 void Task::note_taken(const Commit& commit) noexcept {
@@ -297,8 +314,7 @@ void Task::go_on_with(Participant& participant, bool was_started) noexcept {
     return start_machine(start_on(participant.start_clock_ns));
   }
   if (epoch_ns != 0) {
-    epoch_ns_.store(epoch_ns,
-                    std::memory_order_relaxed);  // relaxed: of one that runs only this thread writes it
+    note_newer(epoch_ns, false);  // a later one may have come for the next start
     participant.shift_ns = machine_.resynchronise(epoch_ns);
   }
   if (!restarts && (epoch_ns != 0 || place_kept_)) machine_.trace_deployment();

@@ -182,6 +182,32 @@ TYPED_TEST(OpenChange, ANewEpochLeavesOutWhoIsLate) {
   this->await_taken();
 }
 
+TYPED_TEST(OpenChange, ALateOneTakesTheNewEpochAtItsNextStart) {
+  this->deploy();
+  this->make_late();
+  const time_ns_t before_ns = this->late->task().grid().reference_ns;
+  this->commit(Transaction().resynchronise());
+  this->await_taken();
+  EXPECT_EQ(before_ns, this->late->task().grid().reference_ns) << "it keeps its grid while it runs";
+  this->host().stop("late", kLong);
+  this->host().start("late");
+  EXPECT_EQ(this->architecture.deployment_epoch_ns(), this->late->task().grid().reference_ns);
+}
+
+TYPED_TEST(OpenChange, OneThatIsLateToAnEpochStartsOnTheLatestOne) {
+  this->deploy();
+  this->make_late(std::move(Transaction().set_property("late", "gain", 2.0).resynchronise()));
+  const time_ns_t first_ns = this->architecture.deployment_epoch_ns();
+  this->pass_time();
+  this->commit(Transaction().resynchronise());
+  EXPECT_GT(this->architecture.deployment_epoch_ns(), first_ns);
+  this->await_taken();
+  EXPECT_EQ(first_ns, this->late->task().grid().reference_ns) << "of the change that it took";
+  this->host().stop("late", kLong);
+  this->host().start("late");
+  EXPECT_EQ(this->architecture.deployment_epoch_ns(), this->late->task().grid().reference_ns);
+}
+
 TYPED_TEST(OpenChange, AReaderThatComesAsAnotherOneGoesHasAPlaceOfItsOwn) {
   this->architecture.template add_resource<SharedData<Number>>("shared");
   this->architecture.connect("b", "input", "shared", "read");

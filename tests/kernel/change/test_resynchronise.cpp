@@ -176,6 +176,14 @@ TYPED_TEST(Resynchronise, LeavesAFaultedOneAloneAndASporadicOneInPlace) {
   EXPECT_EQ(this->epoch_ns(), first.task().grid().reference_ns);
 }
 
+TYPED_TEST(Resynchronise, LiesAheadOfNowAlsoWhereNoComponentTakesIt) {
+  this->deploy();
+  this->host.run_for(ms_to_ns(30));
+  const time_ns_t now_ns = (*this->host).now_ns();
+  this->resynchronise();
+  EXPECT_GE(this->epoch_ns(), now_ns + ms_to_ns(20));
+}
+
 struct RefusingCore : TestCore {
   bool adopt(const CoreBase& /*old*/) override { return false; }
 };
@@ -269,6 +277,44 @@ TEST_F(ResynchroniseHung, OneThatFallsBackMeanwhileIsOnTheNewEpoch) {
   EXPECT_EQ(architecture.deployment_epoch_ns(), hung.task().grid().reference_ns);
   wait_runs(hung, 2);
   EXPECT_EQ(0, hung.task().grid().phase_error(hung.task().get_time()));
+}
+
+/// Holds the thread of the component where a repair has made it STOPPED, before it is parked again.
+struct HoldsAtRepair final : TaskListener {
+  void on_late_wakeup(time_ns_t /*now_ns*/, time_ns_t /*late_ns*/) noexcept override {}
+  void on_late_response(time_ns_t /*now_ns*/, time_ns_t /*response_ns*/) noexcept override {}
+  void on_overrun(time_ns_t /*now_ns*/, std::uint64_t /*overruns*/) noexcept override {}
+  void on_over_declared(time_ns_t /*now_ns*/) noexcept override {}
+  void on_state(time_ns_t /*now_ns*/, ComponentState state) noexcept override {
+    if (state == ComponentState::stopped && !doors.entered) doors.pass();
+  }
+  Doors doors;
+};
+
+TEST_F(ResynchroniseHung, OneThatIsBeingRepairedStartsOnTheNewEpoch) {
+  HoldsAtRepair repair;
+  add("first");
+  Component& repaired = add("repaired");
+  core(repaired).work = [] { throw 42; };
+  deploy();
+  wait_until(
+      [&] { return repaired.task().is_parked() && repaired.task().state() == ComponentState::faulted; },
+      "the fault");
+  ASSERT_TRUE(repaired.task().listening().listen(repair, kForever, kForever));
+  std::thread requester([&] {
+    Transaction transaction;
+    transaction.replace_core("repaired", std::make_unique<TestCore>());
+    deployer.commit(std::move(transaction), {.timeouts = {.commit_ns = s_to_ns(20), .phase_ns = 0}});
+  });
+  wait_until([&] { return repair.doors.entered.load(); }, "the repair");
+  deployer.commit(std::move(Transaction().resynchronise()), {.timeouts = {.phase_ns = 0}});
+  repair.doors.open = true;
+  requester.join();
+  repaired.task().listening().unlisten();
+  deployer.start("repaired");
+  EXPECT_EQ(architecture.deployment_epoch_ns(), repaired.task().grid().reference_ns);
+  wait_runs(repaired, 2);
+  EXPECT_EQ(0, repaired.task().grid().phase_error(repaired.task().get_time()));
 }
 
 TEST(ResynchroniseUndeployed, IsRefused) {

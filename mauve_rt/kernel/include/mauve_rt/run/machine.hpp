@@ -99,6 +99,8 @@ class Machine {
   void set_watchdog(Watchdog* watchdog) MAUVE_RT { watchdog_ = watchdog; }
   /// Counts the grid from the epoch; returns its first instant. [rt]
   time_ns_t join(time_ns_t epoch_ns) MAUVE_RT;
+  /// The next start falls back on this epoch; the grid stays. [rt]
+  void set_deployment(time_ns_t epoch_ns) MAUVE_RT;
   /// Counts the grid from this instant until the next join(), or from the deployment's again. [rt]
   void count_from(std::optional<time_ns_t> reference_ns) MAUVE_RT;
   /// The grid now; a commit may change it any moment. [rt], anyone
@@ -192,7 +194,7 @@ class Machine {
   /// is parked or timed out.
   time_ns_t entered_ns() const MAUVE_RT { return entered_ns_.load(std::memory_order_relaxed); }
   /// All instants to come are later by the same, so that the initial state is entered on the new epoch's grid and no two
-  /// instants come closer together. Returns by how much: less than a period. [rt]
+  /// instants come closer together. Returns by how much: less than a period. A start falls back on set_deployment() still. [rt]
   time_ns_t resynchronise(time_ns_t epoch_ns) MAUVE_RT;
   /// Where the instant pending belongs: the waits since the initial state, modulo g. [rt]
   time_ns_t grid_place_ns() const MAUVE_RT { return grid_place_ns_; }

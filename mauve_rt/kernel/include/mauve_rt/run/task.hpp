@@ -113,7 +113,7 @@ struct ChangeSignal {
 /// | queue_place_ ...       | machine                               | machine      | its own                            |
 /// | ring_                  | ordinary threads, no thread of its own| both         | ring_mutex_; thread's creation     |
 /// | log_ring_              | ordinary threads, no thread of its own| its thread   | thread's creation                  |
-/// | command_mutex_ (PI)    | who starts, commits, ends the thread  | -            | -                                  |
+/// | command_mutex_ (PI)    | who starts, commits, ends the thread, gives an epoch | -            | -                                  |
 /// | order_mutex_ (PI)      | who stops, who starts; for the moment | -            | no stop of one run ends the next   |
 class Task final : public Waiter {
  public:
@@ -222,7 +222,10 @@ class Task final : public Waiter {
   }
   /// The same for the epoch that a commit gives to one that does not run, unless another commit has given it a later one. Several threads
   /// may, at the same time: that of the component, and requesters. [rt]
-  void join_newer(time_ns_t epoch_ns) MAUVE_RT;
+  void join_newer(time_ns_t epoch_ns) MAUVE_RT { note_newer(epoch_ns, true); }
+  /// The epoch of a commit that the component takes no part in: one that runs, or is in a visit, keeps its grid until its next start.
+  /// [non-rt]
+  void join_when_it_starts(time_ns_t epoch_ns) noexcept;
   /// The grid now; another commit may change it any moment. [rt]
   Grid grid() const MAUVE_RT { return machine_.grid(); }
 
@@ -460,6 +463,7 @@ class Task final : public Waiter {
   Shell* shell() const MAUVE_RT { return shell_.load(std::memory_order_acquire); }
   void note_taken(const Commit& commit) MAUVE_RT;
   void join_new_epoch(const Participant& participant) MAUVE_RT;
+  void note_newer(time_ns_t epoch_ns, bool moves_grid) MAUVE_RT;
   void regain_priority() noexcept;
   void fall_back(CommitAction& fallback) noexcept;
   void watch_probation() noexcept;
