@@ -144,6 +144,16 @@ TEST_F(ActionServers, AGoalMaySucceedAlthoughItsClientAskedToCancelIt) {
   EXPECT_EQ((States{{1, {succeeded}}}), carrier.take());
 }
 
+TEST_F(ActionServers, GiveTheNewestFeedbackOnly) {
+  carrier.ask(1, 1);
+  EXPECT_EQ(executing, state());
+  carrier.take();
+  feedback.write({1});
+  feedback.write({2});
+  carrier.take();
+  EXPECT_EQ((std::deque<std::int64_t>{2}), carrier.feedback);
+}
+
 TEST_F(ActionServers, AnEndMayBeToldBeforeItsBeginning) {
   carrier.ask(1, 1);
   EXPECT_EQ(executing, state());
