@@ -7,6 +7,8 @@
 #include <chrono>
 #include <thread>
 
+#include "mauve_rt/data/action_server.hpp"
+
 #include "mauve_examples/control.hpp"
 #include "mauve_examples/exploration.hpp"
 #include "mauve_examples/guidance.hpp"
@@ -66,7 +68,8 @@ class RobotArchitectureOf {
     auto& pose = architecture_.add_resource<mauve::SharedData<Pose2D>>("pose");
     auto& odometry = architecture_.add_resource<mauve::SharedData<Pose2D>>("odometry");
     auto& frames = architecture_.add_resource<mauve::TransformTree>("frames", 8U);
-    auto& operator_goal = architecture_.add_resource<mauve::SharedData<PoseStamped>>("operator_goal");
+    auto& drive_to =
+        architecture_.add_resource<mauve::ActionServer<DriveTo>>("drive_to", 1, mauve::s_to_ns(2));
     auto& command = architecture_.add_resource<mauve::SharedData<Twist>>("command");
     auto& scan = architecture_.add_resource<mauve::SharedData<Scan>>("scan");
     auto& body = architecture_.add_resource<mauve::SharedData<RobotBody>>("body");
@@ -99,7 +102,8 @@ class RobotArchitectureOf {
     connect(control, "command", command, "write");
     connect(guidance, "pose", pose, "read");
     connect(guidance, "goal", goal, "read");
-    connect(guidance, "operator_goal", operator_goal, "read");
+    for (const std::string service : {"status", "goal", "decide", "feedback", "result"})
+      connect(guidance, ("drive_to_" + service).c_str(), drive_to, service.c_str());
     connect(guidance, "lookup", frames, "lookup");
     connect(guidance, "target", target, "write");
     connect(guidance, "map_get", own_map, "get");
@@ -119,7 +123,7 @@ class RobotArchitectureOf {
     pose_ = &pose;
     odometry_ = &odometry;
     frames_ = &frames;
-    operator_goal_ = &operator_goal;
+    drive_to_ = &drive_to;
     command_ = &command;
   }
 
@@ -145,7 +149,7 @@ class RobotArchitectureOf {
   Pose2D pose() { return value(*pose_); }
   Pose2D odometry() { return value(*odometry_); }
   const mauve::TransformBuffer& frames() const { return frames_->buffer(); }
-  void order(const PoseStamped& goal, mauve::time_ns_t now_ns) { operator_goal_->write.write(goal, now_ns); }
+  mauve::ActionServer<DriveTo>& drive_to() { return *drive_to_; }
   void command(const Twist& twist, mauve::time_ns_t now_ns) { command_->write.write(twist, now_ns); }
   std::uint64_t goals() {
     Point goal;
@@ -188,7 +192,7 @@ class RobotArchitectureOf {
   mauve::SharedData<Pose2D>* pose_{nullptr};
   mauve::SharedData<Pose2D>* odometry_{nullptr};
   mauve::TransformTree* frames_{nullptr};
-  mauve::SharedData<PoseStamped>* operator_goal_{nullptr};
+  mauve::ActionServer<DriveTo>* drive_to_{nullptr};
   mauve::SharedData<Twist>* command_{nullptr};
 };
 

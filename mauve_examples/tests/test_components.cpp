@@ -153,26 +153,155 @@ TEST(Components, TheFramesOfARobotAreThoseOfItsPose) {
   robot.expect_no_faults();
 }
 
-TEST(Components, AnOperatorsGoalIsReadInAnyFrameAndGoesFirst) {
-  RobotArchitecture robot("arena");
-  robot.architecture().configure();
-  mauve::Simulation simulation;
-  simulation.add(robot.architecture());
-  simulation.deploy();
-  simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(20));
-  PoseStamped back;  // to the start, which is the origin of the odometry
-  back.header.frame_id = "robot_1/odom";
-  ASSERT_GT(distance_m(robot.pose(), robot.start()), 2.0);
-  robot.order(back, simulation.now_ns());
-  double nearest_m = 1e9;
-  for (int second = 21; second <= 60; ++second) {
-    simulation.run_until(simulation.epoch_ns() + mauve::s_to_ns(second));
-    nearest_m = std::min(nearest_m, distance_m(robot.pose(), robot.start()));
+/// A robot in virtual time, and who sends it goals as a bridge to ROS does.
+class Operator {
+ public:
+  explicit Operator(const char* map) : robot(map) {
+    robot.architecture().configure();
+    host_ = &simulation_.add(robot.architecture());
+    simulation_.deploy();
   }
-  EXPECT_LT(nearest_m, 0.6);
-  EXPECT_GT(distance_m(robot.pose(), robot.start()), 1.0) << "it went on exploring";
-  simulation.shutdown();
-  robot.expect_no_faults();
+
+  void run_for(mauve::time_ns_t time_ns) {
+    const mauve::time_ns_t end_ns = simulation_.now_ns() + time_ns;
+    while (simulation_.now_ns() < end_ns) {
+      simulation_.run_until(std::min(end_ns, simulation_.now_ns() + mauve::ms_to_ns(100)));
+      robot.drive_to().look(simulation_.now_ns());
+      take_news();
+    }
+  }
+  /// Until the goal has ended, for at most this time.
+  void run_to_its_end(mauve::time_ns_t time_ns) {
+    const mauve::time_ns_t end_ns = simulation_.now_ns() + time_ns;
+    while (!mauve::is_final(state) && simulation_.now_ns() < end_ns) run_for(mauve::ms_to_ns(100));
+  }
+  void order(const char* frame, double x, double y, double tolerance_m = 0.0) {
+    DriveTo::Goal goal;
+    goal.tolerance_m = tolerance_m;
+    goal.pose.header.frame_id = frame;
+    goal.pose.pose.position.x = x;
+    goal.pose.pose.position.y = y;
+    std::vector<std::byte> request;
+    mauve::CdrWriter writer(request);
+    writer.put(mauve::GoalId{++goals_});
+    writer.put(goal);
+    ASSERT_EQ(mauve::GoalReason::none, robot.drive_to().ask(request, id_, simulation_.now_ns()));
+    state = mauve::GoalState::unknown;
+  }
+  void cancel() { EXPECT_TRUE(robot.drive_to().cancel(id_, simulation_.now_ns())); }
+  void replace_guidance() {
+    mauve::Transaction change;
+    change.replace_core("guidance", std::make_unique<Guidance>());
+    host_->commit(std::move(change));
+  }
+  double covered_m() { return distance_m(robot.pose(), robot.start()); }
+  void end() {
+    simulation_.shutdown();
+    robot.expect_no_faults();
+  }
+
+  RobotArchitecture robot;
+  mauve::GoalState state{mauve::GoalState::unknown};
+  std::vector<DriveTo::Feedback> feedback;
+  DriveTo::Result result;
+
+ private:
+  void take_news() {
+    mauve::GoalNews news;
+    std::vector<std::byte> message;
+    while (robot.drive_to().next_news(news, message)) {
+      mauve::CdrReader reader(message);
+      mauve::GoalId id{};
+      std::int8_t final_state = 0;
+      if (news.has_feedback) {
+        EXPECT_TRUE(reader.get(id) && reader.get(feedback.emplace_back()));
+      } else {
+        state = news.state;
+      }
+      if (news.has_result) {
+        EXPECT_TRUE(reader.get(final_state) && reader.get(result));
+      }
+    }
+  }
+
+  mauve::Simulation simulation_;
+  mauve::SimulatedHost* host_{nullptr};
+  mauve::GoalId id_{};
+  std::uint8_t goals_{0};
+};
+
+TEST(Components, AnOperatorsGoalIsReadInAnyFrameAndGoesFirst) {
+  Operator user("arena");
+  user.run_for(mauve::s_to_ns(20));
+  const double far_m = user.covered_m();
+  ASSERT_GT(far_m, 2.0);
+  user.order("robot_1/odom", 0.0, 0.0, 0.3);  // to the start, which is the origin of the odometry
+  user.run_to_its_end(mauve::s_to_ns(40));
+  EXPECT_EQ(mauve::GoalState::succeeded, user.state);
+  EXPECT_TRUE(user.result.reached);
+  EXPECT_LE(user.result.distance_m, 0.3);
+  EXPECT_LE(user.covered_m(), 0.4);
+  ASSERT_GT(user.feedback.size(), 5U);
+  EXPECT_NEAR(far_m, user.feedback.front().distance_m, 1.0);
+  EXPECT_LT(user.feedback.back().distance_m, 1.0);
+  EXPECT_GT(user.feedback.back().elapsed_s, 1.0);
+  user.run_for(mauve::s_to_ns(20));
+  EXPECT_GT(user.covered_m(), 1.0) << "it explores on";
+  user.end();
+}
+
+TEST(Components, AReplacedGuidanceGoesOnWithTheGoal) {
+  Operator user("arena");
+  user.run_for(mauve::s_to_ns(20));
+  const Pose2D base = user.robot.pose();
+  user.order("robot_1/base", -3.0, 0.0);  // behind it, where it came from
+  user.run_for(mauve::s_to_ns(2));
+  ASSERT_FALSE(user.feedback.empty());
+  user.replace_guidance();
+  user.run_to_its_end(mauve::s_to_ns(40));
+  EXPECT_EQ(mauve::GoalState::succeeded, user.state);
+  EXPECT_TRUE(std::ranges::is_sorted(user.feedback, {}, &DriveTo::Feedback::elapsed_s));
+  const Point behind{base.x - 3.0 * std::cos(base.theta), base.y - 3.0 * std::sin(base.theta), 0.0};
+  EXPECT_LE(distance_m(user.robot.pose(), behind), 0.6) << "3 m behind where it was at the beginning";
+  user.end();
+}
+
+TEST(Components, ACanceledGoalEndsAndTheRobotExploresOn) {
+  Operator user("arena");
+  user.run_for(mauve::s_to_ns(20));
+  user.order("robot_1/odom", 0.0, 0.0);
+  user.run_for(mauve::s_to_ns(1));
+  EXPECT_EQ(mauve::GoalState::executing, user.state);
+  user.cancel();
+  user.run_to_its_end(mauve::s_to_ns(2));
+  EXPECT_EQ(mauve::GoalState::canceled, user.state);
+  EXPECT_GT(user.result.distance_m, 0.5);
+  const double covered = user.robot.coverage();
+  user.run_for(mauve::s_to_ns(20));
+  EXPECT_GT(user.robot.coverage(), covered);
+  user.end();
+}
+
+TEST(Components, AGoalThatCannotBeReachedIsAborted) {
+  Operator user("room");
+  user.run_for(mauve::s_to_ns(1));
+  user.order("nowhere", 0.0, 0.0);
+  user.run_to_its_end(mauve::s_to_ns(1));
+  EXPECT_EQ(mauve::GoalState::aborted, user.state) << "an unknown frame";
+  EXPECT_TRUE(std::isnan(user.result.distance_m));
+  user.order("map", 1000.0, 0.0);
+  user.run_to_its_end(mauve::s_to_ns(1));
+  EXPECT_EQ(mauve::GoalState::aborted, user.state) << "outside of the map";
+  user.order("map", 0.0, 0.0, 0.05);  // inside of the pillar
+  user.run_for(mauve::s_to_ns(9));
+  EXPECT_EQ(mauve::GoalState::executing, user.state) << "a path may be free later";
+  user.run_to_its_end(mauve::s_to_ns(60));
+  EXPECT_EQ(mauve::GoalState::aborted, user.state);
+  EXPECT_GT(user.result.distance_m, 0.05);
+  user.order("", 0.0, 0.0, 1e3);  // in the map
+  user.run_to_its_end(mauve::s_to_ns(1));
+  EXPECT_EQ(mauve::GoalState::succeeded, user.state);
+  user.end();
 }
 
 TEST(Components, ARobotWithoutDeclaredFramesIsRefused) {

@@ -128,7 +128,15 @@ struct GuidanceShell : mauve::Shell {
   mauve::ReadPort<Pose2D>& pose = read_port<Pose2D>("pose").in_frame("map");
   mauve::ReadPort<Scan>& scan = read_port<Scan>("scan");
   mauve::ReadPort<Point>& goal = read_port<Point>("goal").in_frame("map");
-  mauve::ReadPort<PoseStamped>& operator_goal = read_port<PoseStamped>("operator_goal").optional();
+  mauve::ReadPort<mauve::ActionGoal>& drive_to_status =
+      read_port<mauve::ActionGoal>("drive_to_status").optional();
+  mauve::ReadPort<DriveTo::Goal>& drive_to_goal = read_port<DriveTo::Goal>("drive_to_goal").optional();
+  mauve::WritePort<mauve::ActionGoal>& drive_to_decide =
+      write_port<mauve::ActionGoal>("drive_to_decide").optional();
+  mauve::WritePort<DriveTo::Feedback>& drive_to_feedback =
+      write_port<DriveTo::Feedback>("drive_to_feedback").optional();
+  mauve::WritePort<DriveTo::Result>& drive_to_result =
+      write_port<DriveTo::Result>("drive_to_result").optional();
   mauve::WritePort<Point>& target = write_port<Point>("target", {.on_commit = mauve::OutputPolicy::hold,
                                                                  .on_stop = mauve::OutputPolicy::hold})
                                         .in_frame("map");

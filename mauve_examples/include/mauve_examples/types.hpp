@@ -12,6 +12,7 @@
 #include "mauve_rt/elements/types.hpp"
 
 #include "mauve_types/geometry_msgs/msg/pose_stamped.hpp"
+#include "mauve_types/mauve_msgs/action/drive_to.hpp"
 #include "mauve_types/mauve_msgs/msg/map_update.hpp"
 #include "mauve_types/mauve_msgs/msg/peer_message.hpp"
 #include "mauve_types/mauve_msgs/msg/robot_body.hpp"
@@ -20,6 +21,7 @@ namespace mauve_examples {
 
 using mauve::msg::geometry_msgs::PoseStamped;
 using mauve::msg::mauve_msgs::Bid;
+using mauve::msg::mauve_msgs::DriveTo;
 using mauve::msg::mauve_msgs::MapTile;
 using mauve::msg::mauve_msgs::MapUpdate;
 using mauve::msg::mauve_msgs::PeerAck;

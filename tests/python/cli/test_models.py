@@ -246,7 +246,7 @@ def test_a_model_uses_parts_of_an_installed_package_in_cpp(
     path = tmp_path / "robot.yaml"
     path.write_text(text.replace("../maps", str(examples / "maps")), encoding="utf-8")
     assert main(["check", str(path), str(model)]) == 0
-    assert "5 components, 15 resources, 28 connections: no error found" in capfd.readouterr().out
+    assert "5 components, 15 resources, 32 connections: no error found" in capfd.readouterr().out
     status, told = verdict(str(path), model, capfd)
     assert (status, told["verdict"]["outcome"]) == (0, "schedulable")
 

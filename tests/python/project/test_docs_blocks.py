@@ -27,6 +27,7 @@ ADDED = f"{HOWTO_ROS}a_component_is_removed_and_added_as_the_page_says"
 GIVEN_UP = f"{HOWTO_ROS}a_hung_component_is_given_up_as_the_page_says"
 PART_LOG = "ros/executor/test_part_log.py::test_"
 PEERS = f"{HOWTO_ROS}a_node_of_rclpy_and_its_component_do_the_same"
+SERVED = f"{HOWTO_ROS}the_action_of_the_page_is_served"
 UNIT_FILES = f"{HOWTO}systemd_knows_each_line_of_the_units"
 SNAPSHOT = "python/trace/test_snapshot.py::test_every_reader_reads_a_snapshot_of_a_bag_that_is_being_written"
 WAKEUP = f"{HOWTO}the_wakeup_latency_is_measured_and_used_as_the_page_says"
@@ -220,6 +221,13 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
             "ros/cli/test_watch.py::test_a_table_that_keys_change",
             "ros/cli/test_watch.py::test_once_it_needs_no_terminal",
         ),
+    },
+    "docs/howto/serve_an_action.md": {
+        "executor: {namespace: /robot_1}": (SERVED,),
+        "class DriverShell(Shell)": (SERVED,),
+        "shell; my_robot/DriverShell": (SERVED,),
+        'print("reached:"': (SERVED,),
+        "mauve replace-core": (SERVED,),
     },
     "docs/howto/systemd.md": {
         "Description=MAUVE RT executor": (

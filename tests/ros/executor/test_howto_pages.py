@@ -110,7 +110,7 @@ def test_a_component_is_removed_and_added_as_the_page_says(
     before = page.part("guidance")
     said = page.run("mauve reconfigure")
     assert "would be accepted" in said, said
-    assert "10 steps are in force" in said, said
+    assert "14 steps are in force" in said, said
     after = page.part("guidance")
     assert after.state == ComponentInfo.RUNNING
     kept = ("core", "priority", "cpus", "period_ns")
@@ -211,33 +211,64 @@ def test_enforced_security_refuses_a_program_without_keys(program: str, tmp_path
     assert missing in done.stdout + done.stderr
 
 
+def _package(folder: Path, domain: int, files: dict[str, str], plugins: str) -> dict[str, str]:
+    """Write a package `my_robot` with these files; the environment in which programs find it."""
+    index = "share/ament_index/resource_index"
+    listed = {f"{index}/packages/my_robot": "", f"{index}/mauve_rt_plugins/my_robot": plugins}
+    for name, text in {"my_robot/__init__.py": "", **files, **listed}.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(domain)}
+    for name in ("AMENT_PREFIX_PATH", "PYTHONPATH"):
+        environment[name] = os.pathsep.join([str(folder), environment.get(name, "")])
+    return environment
+
+
+def _executor(file: str) -> list[str]:
+    """The command that runs an architecture file.
+
+    In the page's folder the sources of the project are not on the path of `-m`.
+    """
+    return [sys.executable, "-m", "mauve_rt.node.executor.main", "--ros-args", "-p", f"architecture:={file}"]
+
+
 @pytest.mark.parametrize("peer", ["rclpy", "component"])
 def test_a_node_of_rclpy_and_its_component_do_the_same(peer: str, graph: Any, tmp_path: Path) -> None:
     node, component, plugins, file = _texts("coming_from")
-    index = tmp_path / "share" / "ament_index" / "resource_index"
-    files = {
-        tmp_path / "node.py": node,
-        tmp_path / "my_robot" / "__init__.py": "",
-        tmp_path / "my_robot" / "doubler.py": component,
-        index / "packages" / "my_robot": "",
-        index / "mauve_rt_plugins" / "my_robot": plugins,
-        tmp_path / "robot.yaml": file,
-    }
-    for path, text in files.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding="utf-8")
-    environment = {**os.environ, "ROS_DOMAIN_ID": str(graph.node.context.get_domain_id())}
-    for name in ("AMENT_PREFIX_PATH", "PYTHONPATH"):
-        environment[name] = os.pathsep.join([str(tmp_path), environment.get(name, "")])
-    words = ["-m", "mauve_rt.node.executor.main", "--ros-args", "-p", "architecture:=robot.yaml"]
-    command = [sys.executable, *(["node.py"] if peer == "rclpy" else words)]
-    # in the page's folder: the sources of the project are not on the path of `-m`
+    files = {"node.py": node, "my_robot/doubler.py": component, "robot.yaml": file}
+    environment = _package(tmp_path, graph.node.context.get_domain_id(), files, plugins)
+    command = [sys.executable, "node.py"] if peer == "rclpy" else _executor("robot.yaml")
     with subprocess.Popen(command, env=environment, cwd=tmp_path) as process:
         try:
             voice = graph.voice(Float64, "/given")
             passed = graph.hear(Float64, "/passed")
             voice.publish(Float64(data=21.0))
             graph.spin_until(lambda: any(message.data == 42.0 for message in passed), "the double")
+        finally:
+            process.send_signal(signal.SIGINT)
+            process.wait()
+
+
+def test_the_action_of_the_page_is_served(graph: Any, tmp_path: Path) -> None:
+    file, core, plugins, send, replace = _texts("serve_an_action")
+    files = {"drive.yaml": file, "my_robot/driver.py": core, "send.py": send}
+    environment = _package(tmp_path, graph.node.context.get_domain_id(), files, plugins)
+    page = Commands("serve_an_action", graph, tmp_path)
+    with subprocess.Popen(_executor("drive.yaml"), env=environment, cwd=tmp_path) as process:
+        try:
+            with subprocess.Popen(
+                [sys.executable, "send.py"], env=environment, cwd=tmp_path, stdout=subprocess.PIPE, text=True
+            ) as client:
+                assert client.stdout is not None
+                first = client.stdout.readline()
+                said = page.run(replace.strip())
+                assert "took over driven_m, number" in said or "took over number, driven_m" in said, said
+                lines = client.communicate(timeout=60)[0].splitlines()
+            assert float(first.removesuffix(" m\n")) > 0.0
+            assert lines[-1] == "reached: True"
+            left = [float(line.removesuffix(" m")) for line in lines[:-1]]
+            assert left == sorted(left, reverse=True), "the new core went on where the old one was"
         finally:
             process.send_signal(signal.SIGINT)
             process.wait()

@@ -30,31 +30,26 @@ struct TransformedSample {
   bool is_new() const MAUVE_RT { return status == DataStatus::new_data; }
 };
 
-/// Reads a pose, point, vector, rotation, twist or wrench (transformed_values.hpp), and looks the transform from its frame to the
-/// port's own up, at the time at which the value was written. A shell has it beside its read port and its call port:
-///
-///   struct FollowShell : mauve::Shell {
-///     mauve::CallPort<mauve::CallOf<mauve::LookupTransform>>& lookup = call_port<mauve::LookupTransform>("lookup");
-///     mauve::TransformedReadPort<PoseStamped> goal{read_port<PoseStamped>("goal"), lookup, {.to = "map"}};
-///   };
-template <typename T>
-class TransformedReadPort {
+/// How values are transformed.
+struct TransformOptions {
+  std::string_view to;    // the frame of what it yields
+  bool is_latest{false};  // by the latest transform that there is, in the place of that at the value's time
+};
+
+/// Transforms poses, points, vectors, rotations, twists and wrenches (transformed_values.hpp) to one frame: those that a
+/// TransformedReadPort reads, or parts of other values, as the pose in the goal of an action.
+class ToFrame {
  public:
-  struct Options {
-    std::string_view to;    // the frame of what it yields
-    bool is_latest{false};  // by the latest transform that there is, in the place of that at the value's time
-  };
+  ToFrame(CallPort<CallOf<LookupTransform>>& lookup, const TransformOptions& options)
+      : lookup_(lookup), to_(options.to), is_latest_(options.is_latest) {}
 
-  /// What has no header, or an empty frame_id, is in the frame that `port` declares: in_frame(), or the architecture file. [setup]
-  TransformedReadPort(ReadPort<T>& port, CallPort<CallOf<LookupTransform>>& lookup, const Options& options)
-      : port_(port), lookup_(lookup), to_(options.to), is_latest_(options.is_latest) {}
-
-  /// [rt] as far as the services are that both ports are connected to.
-  TransformedSample<T> read() {
-    const Sample<T> sample = port_.read();
+  /// By the transform at the time of the sample. What has no header, or an empty frame_id, is in the frame of `declared`.
+  /// [rt] as far as the service is that the port is connected to.
+  template <typename T>
+  TransformedSample<T> transform(const Sample<T>& sample, const Frames* declared = nullptr) const {
     TransformedSample<T> found{.status = sample.status, .time_ns = sample.time_ns};
     if (sample.status == DataStatus::none) return found;
-    const FrameName source = source_of(sample.value);
+    const FrameName source = source_of(sample.value, declared);
     if (source == to_) {
       found.value = sample.value;
       return found;
@@ -73,19 +68,42 @@ class TransformedReadPort {
   }
 
  private:
-  FrameName source_of(const T& value) const MAUVE_RT {
+  template <typename T>
+  static FrameName source_of(const T& value, const Frames* declared) MAUVE_RT {
     if constexpr (HasFrame<T>) {
       if (const std::string_view given = value.header.frame_id.view(); !given.empty())
         return FrameName(given);
     }
-    const Frames* const declared = port_.frames();
     return declared != nullptr ? FrameName(declared->frame) : FrameName();
   }
 
-  ReadPort<T>& port_;
   CallPort<CallOf<LookupTransform>>& lookup_;
   FrameName to_;
   bool is_latest_;
+};
+
+/// Reads a pose, point, vector, rotation, twist or wrench (transformed_values.hpp), and looks the transform from its frame to the
+/// port's own up, at the time at which the value was written. A shell has it beside its read port and its call port:
+///
+///   struct FollowShell : mauve::Shell {
+///     mauve::CallPort<mauve::CallOf<mauve::LookupTransform>>& lookup = call_port<mauve::LookupTransform>("lookup");
+///     mauve::TransformedReadPort<PoseStamped> goal{read_port<PoseStamped>("goal"), lookup, {.to = "map"}};
+///   };
+template <typename T>
+class TransformedReadPort {
+ public:
+  using Options = TransformOptions;
+
+  /// What has no header, or an empty frame_id, is in the frame that `port` declares: in_frame(), or the architecture file. [setup]
+  TransformedReadPort(ReadPort<T>& port, CallPort<CallOf<LookupTransform>>& lookup, const Options& options)
+      : port_(port), to_frame_(lookup, options) {}
+
+  /// [rt] as far as the services are that both ports are connected to.
+  TransformedSample<T> read() { return to_frame_.transform(port_.read(), port_.frames()); }
+
+ private:
+  ReadPort<T>& port_;
+  ToFrame to_frame_;
 };
 
 }  // namespace mauve
