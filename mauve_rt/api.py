@@ -14,6 +14,8 @@ from mauve_rt._kernel import (
     Deployer,
     Duration,
     ExecutionTimeDescription,
+    GoalReason,
+    GoalState,
     Host,
     MauveError,
     PluginRegistry,
@@ -33,8 +35,11 @@ from mauve_rt._kernel import (
     monotonic_ns,
 )
 from mauve_rt.model.build import open_architecture
+from mauve_rt.parts.action_ports import ActionClientPorts, ActionServerPorts
 from mauve_rt.parts.cores import Core
 from mauve_rt.parts.declarations import (
+    action_client,
+    action_server,
     call_port,
     event_port,
     property,  # noqa: A004
@@ -44,9 +49,12 @@ from mauve_rt.parts.declarations import (
     write_port,
 )
 from mauve_rt.parts.fsms import Fsm, PeriodicFsm, State, times
+from mauve_rt.parts.goals import GoalNews, GoalSender
 from mauve_rt.parts.model_core import ModelCore
 from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, RequestPort, Sample, WritePort
 from mauve_rt.parts.resources import (
+    ActionClient,
+    ActionServer,
     AnyResource,
     EventCounter,
     LatestValue,
@@ -65,6 +73,10 @@ from mauve_rt.parts.transformed_ports import TransformedReadPort, TransformedSam
 __all__ = [
     "FOREVER",
     "NOT_MEASURED",
+    "ActionClient",
+    "ActionClientPorts",
+    "ActionServer",
+    "ActionServerPorts",
     "AnyResource",
     "Architecture",
     "ArchitectureDescription",
@@ -78,6 +90,10 @@ __all__ = [
     "EventPort",
     "ExecutionTimeDescription",
     "Fsm",
+    "GoalNews",
+    "GoalReason",
+    "GoalSender",
+    "GoalState",
     "Host",
     "LatestValue",
     "MauveError",
@@ -111,6 +127,8 @@ __all__ = [
     "TransformedReadPort",
     "TransformedSample",
     "WritePort",
+    "action_client",
+    "action_server",
     "call_port",
     "event_port",
     "monotonic_ns",

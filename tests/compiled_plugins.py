@@ -82,11 +82,16 @@ def compile_plugin(source: Path, library: Path) -> None:
 
 def install_plugins(prefix: Path, package: str) -> None:
     """Compile `plugins/PACKAGE.cpp` and list what PACKAGE.txt says, in an ament prefix."""
-    index = prefix / "share" / "ament_index" / "resource_index"
+    list_plugins(prefix, package)
     (prefix / "lib").mkdir(exist_ok=True)
+    compile_plugin(PLUGINS / f"{package}.cpp", prefix / "lib" / f"lib{package}.so")
+
+
+def list_plugins(prefix: Path, package: str) -> None:
+    """List what `plugins/PACKAGE.txt` says, in an ament prefix."""
+    index = prefix / "share" / "ament_index" / "resource_index"
     (prefix / "share" / package).mkdir(parents=True)
     for kind in ("packages", "mauve_rt_plugins"):
         (index / kind).mkdir(parents=True, exist_ok=True)
     (index / "packages" / package).touch()
     shutil.copy(PLUGINS / f"{package}.txt", index / "mauve_rt_plugins" / package)
-    compile_plugin(PLUGINS / f"{package}.cpp", prefix / "lib" / f"lib{package}.so")

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from compiled_plugins import PLUGINS, install_plugins
+from compiled_plugins import PLUGINS, install_plugins, list_plugins
 from rebuilt_package import RebuiltPackage, install_package, search_first
 
 from mauve_rt import _kernel
@@ -48,6 +48,14 @@ def misfits_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An ament prefix with the package misfits, which is searched only where a test says so."""
     prefix = tmp_path_factory.mktemp("misfits")
     install_plugins(prefix, "misfits")
+    return prefix
+
+
+@pytest.fixture(scope="session")
+def action_prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An ament prefix with the package action_tests, all in Python; searched only where a test says so."""
+    prefix = tmp_path_factory.mktemp("action_tests")
+    list_plugins(prefix, "action_tests")
     return prefix
 
 

@@ -11,6 +11,15 @@
 
 namespace mauve::bindings {
 
+/// As GoalNews.
+struct PyGoalNews {
+  std::uint64_t goal;  // as ask_goal() returned it
+  GoalState state;
+  GoalReason reason;
+  std::optional<py::bytes> feedback{};
+  std::optional<py::bytes> result{};
+};
+
 /// A host with what its waits have seen, so that Python needs to carry nothing from call to call. In virtual time
 /// nothing happens while the caller waits: waits return at once.
 class PyHost {
@@ -33,6 +42,10 @@ class PyHost {
   void wake() noexcept;
   bool write_resource(const std::string& name, const py::bytes& data);
   ReadMessage read_resource(const std::string& name);
+  /// As a client of the action does, without ROS: one thread at a time.
+  std::pair<std::uint64_t, GoalReason> ask_goal(const std::string& name, const py::bytes& data);
+  bool cancel_goal(const std::string& name, std::uint64_t goal);
+  std::optional<PyGoalNews> next_news(const std::string& name);
   std::vector<std::string> trace_components() const { return host().trace_components(); }
   /// In virtual time whoever drives it drains in time, without a thread.
   void collect_trace(time_ns_t period_ns);
@@ -57,6 +70,7 @@ class PyHost {
   time_ns_t keep_period_ns_{0};  // under collector_mutex_; 0: what is collected is for the watch alone
   std::unique_ptr<TraceCollector> collector_;  // under collector_mutex_
   std::atomic<bool> woken_{false};             // release/acquire: set once, for good
+  std::uint64_t goals_asked_{0};               // of the one thread that asks for goals
   std::uint32_t seen_change_{0};               // of the one thread that waits for changes
 };
 

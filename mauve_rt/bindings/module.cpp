@@ -39,6 +39,7 @@ Attributes:
   bind_state_keeper(module);
   bind_value_log(module);
   bind_transforms(module);
+  bind_goals(module);
   bind_host(module);
   bind_simulation(module);
   bind_rules(module);

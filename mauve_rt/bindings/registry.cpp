@@ -12,16 +12,20 @@ struct DataResource {
   std::string kind;
   std::string type;
   ResourceParameters parameters;
-  std::optional<Message> zero;  // none: it cannot be serialized
-  int frame_ids{0};             // as of SerializedOptions
+  std::vector<Message> zeros;  // as of SerializedOptions; none: it cannot be serialized
+  int frame_ids{0};            // as of SerializedOptions
 };
 
 std::unique_ptr<Resource> make_data_resource(const DataResource& data, const PluginRegistry& registry) {
-  const std::vector<std::string> types = registry.names("type");
-  if (data.zero && !std::binary_search(types.begin(), types.end(), data.type)) {
-    const ResourceParameters all = registry.checked_parameters(data.kind, data.parameters);
-    return make_serialized_resource(
-        data.kind, {.type = data.type, .zero = *data.zero, .parameters = all, .frame_ids = data.frame_ids});
+  const TypeNeed need = registry.resource_kind(data.kind).type;
+  if (need != TypeNeed::none && data.zeros.size() == messages_of(need)) {
+    const std::vector<std::string> types = registry.names(std::string(to_string(need)));
+    if (!std::binary_search(types.begin(), types.end(), data.type)) {
+      const ResourceParameters all = registry.checked_parameters(data.kind, data.parameters);
+      return make_serialized_resource(
+          data.kind,
+          {.type = data.type, .zeros = data.zeros, .parameters = all, .frame_ids = data.frame_ids});
+    }
   }
   return registry.make_resource(data.kind, data.type, data.parameters);
 }
@@ -110,7 +114,8 @@ void bind_resource_kinds(py::module_& module) {
       .def_readonly("minimum", &ResourceParameter::minimum)
       .def_readonly("maximum", &ResourceParameter::maximum)
       .def_readonly("required", &ResourceParameter::is_required)
-      .def_readonly("counts_values", &ResourceParameter::is_value_count, "So many values more take memory.")
+      .def_readonly("values_each", &ResourceParameter::values_each,
+                    "So many values more take memory, for each one that it counts.")
       .def_readonly("limits_readers", &ResourceParameter::is_reader_limit,
                     "So many ports may connect to the service `read`.")
       .def_property_readonly(
@@ -146,24 +151,26 @@ void bind_registry(py::module_& module) {
       .def_readonly("name", &PartFactory::name);
   py::class_<DataResource>(
       module, "DataResource",
-      R"(A resource of a data type. `zero`: the message's default, serialized; None when it is no message.
+      R"(A resource of a data type. `zeros`: the message's default, serialized; empty when it is no message.
+
+Of an action the defaults of its goal, result and feedback.
 
 `frame_ids`: 1 if the message begins with a header, 2 if child_frame_id follows the header; else 0.)")
       .def(py::init([](const std::string& kind, const std::string& type,
                        const Typed<"dict[str, bool | int | float | str]">& parameters,
-                       const std::optional<py::bytes>& zero, int frame_ids) {
+                       const std::vector<py::bytes>& zeros, int frame_ids) {
              DataResource made{.kind = kind,
                                .type = type,
                                .parameters = parameters_of(py::dict(parameters)),
-                               .zero = {},
+                               .zeros = {},
                                .frame_ids = frame_ids};
-             if (zero) {
-               const auto bytes = std::as_bytes(std::span(std::string_view(*zero)));
-               made.zero.emplace(bytes.begin(), bytes.end());
+             for (const std::string_view zero : zeros) {
+               const auto bytes = std::as_bytes(std::span(zero));
+               made.zeros.emplace_back(bytes.begin(), bytes.end());
              }
              return made;
            }),
-           py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zero"),
+           py::kw_only(), py::arg("kind"), py::arg("type"), py::arg("parameters"), py::arg("zeros"),
            py::arg("frame_ids") = 0);
   py::class_<PluginGeneration, std::shared_ptr<PluginGeneration>>(
       module, "PluginGeneration",

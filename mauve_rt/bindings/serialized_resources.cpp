@@ -42,7 +42,7 @@ class SerializedResource : public Resource {
       const std::lock_guard lock(mutex_);
       sequence = look(message, time_ns);
     }
-    if (sequence == 0) message = options_.zero;
+    if (sequence == 0) message = options_.zeros.front();
     return sequence != 0;
   }
   void begin_log(std::size_t bytes) override {
@@ -251,22 +251,25 @@ class SerializedRing final : public SerializedResource {
 };
 
 template <typename Made>
-std::unique_ptr<Resource> make_serialized(SerializedOptions options) {
-  return std::make_unique<Made>(std::move(options));
+std::unique_ptr<Resource> make_serialized(const SerializedOptions& options) {
+  return std::make_unique<Made>(options);
 }
 
-using SerializedFactory = std::unique_ptr<Resource> (*)(SerializedOptions options);
+using SerializedFactory = std::unique_ptr<Resource> (*)(const SerializedOptions& options);
 /// The given kinds that hold serialized messages too: those with the parameter max_bytes.
 const std::map<std::string, SerializedFactory>& serialized_kinds() {
   static const std::map<std::string, SerializedFactory> kinds{
       {SharedDataKind::describe().name, make_serialized<SerializedData>},
-      {RingBufferKind::describe().name, make_serialized<SerializedRing>}};
+      {RingBufferKind::describe().name, make_serialized<SerializedRing>},
+      {ActionServerKind::describe().name, make_serialized_server},
+      {ActionClientKind::describe().name, make_serialized_client}};
   return kinds;
 }
 
 }  // namespace
 
-std::unique_ptr<Resource> make_serialized_resource(const std::string& kind, SerializedOptions options) {
+std::unique_ptr<Resource> make_serialized_resource(const std::string& kind,
+                                                   const SerializedOptions& options) {
   const auto found = serialized_kinds().find(kind);
   if (found == serialized_kinds().end()) {
     std::vector<std::string> kinds;
@@ -278,13 +281,14 @@ std::unique_ptr<Resource> make_serialized_resource(const std::string& kind, Seri
                  .remedy = "load a library that registers it, or use one of " + join(kinds)});
   }
   const auto max_bytes = static_cast<std::size_t>(get<std::int64_t>(options.parameters, "max_bytes"));
-  if (max_bytes < options.zero.size()) {
+  for (const Message& zero : options.zeros) {
+    if (zero.size() <= max_bytes) continue;
     throw Error(ErrorCode::invalid_argument, "the resource has no room for a message of its type",
                 {.element = "max_bytes",
-                 .expected = "at least " + std::to_string(options.zero.size()),
+                 .expected = "at least " + std::to_string(zero.size()),
                  .found = std::to_string(max_bytes)});
   }
-  return found->second(std::move(options));
+  return found->second(options);
 }
 
 }  // namespace mauve::bindings

@@ -34,6 +34,8 @@ void bind_state_keeper(py::module_& module);
 void bind_architecture(py::module_& module);
 /// Registers StepReport, RealtimeStatus and TraceDrain.
 void bind_reports(py::module_& module);
+/// Registers GoalState, GoalReason and what a host reports of goals; before Host.
+void bind_goals(py::module_& module);
 /// Registers Host and Deployer.
 void bind_host(py::module_& module);
 void bind_value_log(py::module_& module);

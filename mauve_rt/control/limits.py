@@ -67,7 +67,9 @@ def bytes_of_resource(resource: ResourceModel, registry: PluginRegistry) -> int:
     if kind is None:
         return 0
     told = {each.name: resource.parameters.get(each.name, each.initial) for each in kind.parameters}
-    values = kind.values + sum(int(told[each.name]) for each in kind.parameters if each.counts_values)
+    values = kind.values + sum(int(told[each.name]) * each.values_each for each in kind.parameters)
     depth = (resource.topic.qos.depth or 0) if resource.topic is not None and values else 0
     value_bytes = registry.value_bytes(resource.type, capacities(resource.parameters))
-    return (value_bytes or int(told.get("max_bytes", 0))) * (values + depth)
+    if not value_bytes and resource.type not in registry.names(kind.type_kind or "type"):
+        value_bytes = int(told.get("max_bytes", 0))
+    return value_bytes * (values + depth)

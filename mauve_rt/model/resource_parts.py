@@ -5,7 +5,7 @@ from typing import Any
 from mauve_rt._kernel import PluginRegistry, ResourceDescription
 from mauve_rt.model.resource_kinds import has_key
 from mauve_rt.model.schema import ResourceModel
-from mauve_rt.parts.message_types import is_message, is_promised
+from mauve_rt.parts.message_types import action_class, is_message, is_promised
 
 _IN_PLACE, _STAND_IN = "latest_value", "shared_data"
 """The kind that needs a struct in C++, and the one that checks take where a model only promises it."""
@@ -21,13 +21,19 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
         of_section = getattr(getattr(resource, section, None), key, None) if section else None
         if of_section is not None:
             parameters[parameter.name] = round(of_section * 1e6)  # service.timeout_ms, action.answer_ms
-    can_be_serialized = has_key(registry.resource_kind(kind), "max_bytes")
-    if can_be_serialized and name not in registry.names("type") and is_message(name):
+    of_kind = registry.resource_kind(kind)
+    is_registered = bool(of_kind.type_kind) and name in registry.names(of_kind.type_kind)
+    if has_key(of_kind, "max_bytes") and not is_registered and _is_known(name):
         return {"resource": DataOfKind(kind, name, **parameters)}
     if kind == _IN_PLACE and name not in registry.names("type") and is_promised(name):
         # Before the struct is generated: the same services. The file was checked for its limits.
         return {"resource": DataOfKind(_STAND_IN, name)}
     return {"kind": kind, "type": name, **parameters}
+
+
+def _is_known(name: str) -> bool:
+    """Whether Python knows the message or the action."""
+    return is_message(name) or action_class(name) is not None
 
 
 def describe_resource(resource: ResourceModel, registry: PluginRegistry) -> ResourceDescription:

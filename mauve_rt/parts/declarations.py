@@ -13,6 +13,7 @@ A type is a class of ROS messages, or a name such as "geometry_msgs/msg/Point".
 from collections.abc import Callable, Collection
 from typing import Any, Concatenate, ParamSpec, TypeVar, overload
 
+from mauve_rt.parts.action_ports import ActionClientPorts, ActionServerPorts, ActionType
 from mauve_rt.parts.ports import (
     CallPort,
     EventPort,
@@ -27,6 +28,8 @@ from mauve_rt.parts.resources import service_type
 from mauve_rt.parts.transformed_ports import TransformedReadPort
 
 __all__ = [
+    "action_client",
+    "action_server",
     "call_port",
     "event_port",
     "property",
@@ -40,6 +43,8 @@ T = TypeVar("T")
 V = TypeVar("V", bound=bool | int | float | str)
 P = ParamSpec("P")
 R = TypeVar("R")
+F = TypeVar("F")
+G = TypeVar("G")
 
 
 def read_port(
@@ -78,6 +83,19 @@ def write_port(
         frame=frame,
         child_frame=child_frame,
     )
+
+
+def action_server(action: ActionType[G, R, F]) -> ActionServerPorts[G, R, F]:
+    """The ports of a component that executes goals of a ROS action, such as `DriveTo`.
+
+    Of an attribute `drive` they are drive_status, drive_goal, drive_decide, drive_feedback and drive_result.
+    """
+    return ActionServerPorts(action)
+
+
+def action_client(action: ActionType[G, R, F]) -> ActionClientPorts[G, R, F]:
+    """The ports of a component that sends goals; named as those of `action_server`."""
+    return ActionClientPorts(action)
 
 
 @overload

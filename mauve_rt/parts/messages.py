@@ -4,9 +4,10 @@ import copy
 from functools import cache
 from typing import Any
 
-from mauve_rt.parts.message_types import is_promised, message_class
+from mauve_rt.parts.message_types import PARTS_OF_ACTIONS, action_class, is_promised, message_class
 
 __all__ = [
+    "action_name",
     "deserialize",
     "frame_ids",
     "in_frames",
@@ -15,6 +16,7 @@ __all__ = [
     "service_name",
     "type_name",
     "zero",
+    "zeros",
 ]
 
 
@@ -50,12 +52,30 @@ def service_name(service: Any) -> str:
     return f"{package}/srv/{service.__name__}"
 
 
+def action_name(action: Any) -> str:
+    """`mauve_msgs/action/DriveTo` of that class.
+
+    Raises:
+        TypeError: no class of a ROS action.
+    """
+    if not isinstance(action, type) or not all(hasattr(action, part) for part in PARTS_OF_ACTIONS):
+        raise TypeError(f"expected a class of a ROS action such as DriveTo, found {action!r}")
+    return f"{action.__module__.partition('.')[0]}/action/{action.__name__}"
+
+
 def zero(name: str) -> bytes | None:
     """The serialized message with every field at its default; None when the type is no installed message."""
     found = message_class(name)
     if found is None:
         return _EMPTY if is_promised(name) else None
     return serialize(found())
+
+
+def zeros(name: str) -> list[bytes]:
+    """The messages of a type, as `zero`: one, of an action three; none when the type is not installed."""
+    parts = [f"{name}_{part}" for part in PARTS_OF_ACTIONS] if action_class(name) is not None else [name]
+    found = [zero(part) for part in parts]
+    return [each for each in found if each is not None] if None not in found else []
 
 
 @cache

@@ -10,6 +10,8 @@ from mauve_rt.parts.part import Configurable, implementation_name
 from mauve_rt.parts.ports import Sample
 
 __all__ = [
+    "ActionClient",
+    "ActionServer",
     "AnyResource",
     "DataOfKind",
     "EventCounter",
@@ -171,7 +173,7 @@ class DataOfKind(AnyResource, Generic[T]):
             kind=kind,
             type=name,
             parameters=parameters,
-            zero=messages.zero(name) if name else None,
+            zeros=messages.zeros(name) if name else [],
             frame_ids=messages.frame_ids(messages.message_class(name)) if name else 0,
         )
 
@@ -222,6 +224,44 @@ class LatestValue(DataOfKind[T]):
 
     def __init__(self, type: type[T] | str, *, max_readers: int | None = None) -> None:  # noqa: A002
         super().__init__("latest_value", type, **_told(max_readers=max_readers))
+
+
+class ActionServer(DataOfKind[Any]):
+    """Goals of an action for a component: `goals` (1) at once, each answered within `answer_ns` (0.1 s).
+
+    `type`: a class of a ROS action such as `DriveTo`, or its name. Goals, results and feedback of a type that
+    no loaded library registered are held serialized, each up to `max_bytes` (65,536), as by `SharedData`.
+    """
+
+    def __init__(
+        self,
+        type: Any,  # noqa: A002
+        *,
+        goals: int | None = None,
+        answer_ns: int | None = None,
+        max_bytes: int | None = None,
+    ) -> None:
+        told = _told(goals=goals, answer_ns=answer_ns, max_bytes=max_bytes)
+        name = type if isinstance(type, str) else messages.action_name(type)
+        super().__init__("action_server", name, **told)
+
+
+class ActionClient(DataOfKind[Any]):
+    """The goals of a component for a server, one at a time, each answered within `answer_ns` (1 s).
+
+    `type` and `max_bytes`: as of `ActionServer`.
+    """
+
+    def __init__(
+        self,
+        type: Any,  # noqa: A002
+        *,
+        answer_ns: int | None = None,
+        max_bytes: int | None = None,
+    ) -> None:
+        told = _told(answer_ns=answer_ns, max_bytes=max_bytes)
+        name = type if isinstance(type, str) else messages.action_name(type)
+        super().__init__("action_client", name, **told)
 
 
 class EventCounter(DataOfKind[int]):

@@ -12,6 +12,7 @@
 #include "mauve_rt/base/error.hpp"
 #include "mauve_rt/base/seam/guards.hpp"
 #include "mauve_rt/base/time.hpp"
+#include "mauve_rt/data/cdr.hpp"
 
 #include "rcl_error.hpp"
 
@@ -33,6 +34,26 @@ struct SendGoalResponse {
   bool accepted;
   builtin_interfaces__msg__Time stamp;
 };
+struct StateFirst {  // GetResult_Response
+  std::int8_t state;
+};
+
+// On the wire, too, the id comes first. Its 16 bytes keep every alignment: what follows it is a message as it stands.
+constexpr std::size_t kIdEnd = kCdrHeader.size() + sizeof(IdFirst);
+
+/// A message that begins with an id, without the id.
+void cut_id(std::span<const std::byte> whole, std::vector<std::byte>& part) {
+  const auto header = whole.first(std::min(whole.size(), kCdrHeader.size()));
+  part.assign(header.begin(), header.end());
+  if (whole.size() <= kIdEnd) return;
+  const auto rest = whole.subspan(kIdEnd);
+  part.insert(part.end(), rest.begin(), rest.end());
+}
+
+void insert_id(const GoalId& id, std::vector<std::byte>& message) {
+  const auto bytes = std::as_bytes(std::span(id));
+  message.insert(message.begin() + std::ssize(kCdrHeader), bytes.begin(), bytes.end());
+}
 
 std::string described(const ActionSettings& settings) {
   return "resource " + settings.resource + ", action " + settings.name;
@@ -96,6 +117,23 @@ SteadyClock::SteadyClock() {
 }
 SteadyClock::~SteadyClock() { went_well(rcl_clock_fini(&clock_)); }
 
+ResultResponse::ResultResponse(const ActionTypeSupport& type)
+    : response_(type.result_response), type_(type.result), offset_(type.result_offset) {}
+
+GoalState ResultResponse::state() const noexcept {
+  return static_cast<GoalState>(response_.as<StateFirst>().state);
+}
+void ResultResponse::set_state(GoalState state) noexcept {
+  response_.as<StateFirst>().state = static_cast<std::int8_t>(state);
+}
+bool ResultResponse::deserialize_result(std::vector<std::byte>& message) {
+  const rcl_serialized_message_t serialized = borrowed(message);
+  return went_well(rmw_deserialize(&serialized, type_, result()));
+}
+bool ResultResponse::serialize_result(OwnedMessage& into) const {
+  return went_well(rmw_serialize(result(), type_, into.get()));
+}
+
 // ---- a server
 
 OfferedAction::OfferedAction(rcl_node_t& node, const ActionSettings& settings)
@@ -107,7 +145,7 @@ OfferedAction::OfferedAction(rcl_node_t& node, const ActionSettings& settings)
       goal_request_(type_.goal_request),
       goal_response_(type_.goal_response),
       result_request_(type_.result_request),
-      result_response_(type_.result_response),
+      result_response_(type_),
       feedback_(type_.feedback) {
   rcl_action_server_options_t options = rcl_action_server_get_default_options();
   options.goal_service_qos.depth = kGoalRequests;
@@ -115,7 +153,8 @@ OfferedAction::OfferedAction(rcl_node_t& node, const ActionSettings& settings)
                                &options),
         "the action cannot be offered", described(settings));
   OwnedMessage unknown;
-  if (result_response_.serialize(unknown)) unknown_.assign(unknown.bytes().begin(), unknown.bytes().end());
+  if (result_response_.serialize_result(unknown))
+    unknown_.assign(unknown.bytes().begin(), unknown.bytes().end());
 }
 
 void OfferedAction::attach(std::shared_ptr<Resource> resource) {
@@ -156,10 +195,13 @@ void OfferedAction::take_goals() {
     const LockGuard lock(mutex_);
     rmw_request_id_t asked{};
     if (!went_well(rcl_action_take_goal_request(entity_.get(), &asked, goal_request_.get()))) return;
-    GoalId id = id_of(goal_request_);
-    // Who sends may hear of the goal before it is noted: it waits for the mutex.
-    const bool waits = !goals_.contains(id) && goal_request_.serialize(incoming_) &&
-                       server_->ask(incoming_.bytes(), id, monotonic_now_ns()) == GoalReason::none;
+    const GoalId id = id_of(goal_request_);
+    bool waits = false;
+    if (!goals_.contains(id) && goal_request_.serialize(incoming_)) {
+      cut_id(incoming_.bytes(), goal_);
+      // The sender's thread may find the goal before it is noted here: that thread waits for the mutex.
+      waits = server_->ask(id, goal_, monotonic_now_ns()) == GoalReason::none;
+    }
     if (waits) {
       goals_[id].asked = asked;
     } else {
@@ -204,18 +246,20 @@ void OfferedAction::take_results() {
     if (!went_well(rcl_action_take_result_request(entity_.get(), &asked, result_request_.get()))) return;
     const auto found = goals_.find(id_of(result_request_));
     if (found == goals_.end()) {
-      send_result(asked, unknown_);
-    } else if (!found->second.result.empty()) {
-      send_result(asked, found->second.result);
+      send_result(asked, GoalState::unknown, unknown_);
+    } else if (is_final(found->second.ended)) {
+      send_result(asked, found->second.ended, found->second.result);
     } else if (found->second.results.size() < kResultRequests) {
       found->second.results.push_back(asked);
     }
   }
 }
 
-void OfferedAction::send_result(const rmw_request_id_t& asked, std::vector<std::byte>& result) {
+void OfferedAction::send_result(const rmw_request_id_t& asked, GoalState ended,
+                                std::vector<std::byte>& result) {
   rmw_request_id_t id = asked;
-  if (result_response_.deserialize(result))
+  result_response_.set_state(ended);
+  if (result_response_.deserialize_result(result))
     went_well(rcl_action_send_result_response(entity_.get(), &id, result_response_.get()));
 }
 
@@ -234,6 +278,7 @@ bool OfferedAction::send() {
   const auto found = goals_.find(news.id);
   if (found == goals_.end()) return true;
   if (news.has_feedback) {
+    insert_id(news.id, message_);
     if (feedback_.deserialize(message_))
       went_well(rcl_action_publish_feedback(entity_.get(), feedback_.get()));
   } else if (news.state == GoalState::rejected || !accept(news.id, found->second)) {
@@ -275,8 +320,10 @@ void OfferedAction::follow(const GoalNews& news, Goal& goal) {
   if (news.state == GoalState::canceled) update(GOAL_EVENT_CANCELED);
   if (!news.has_result) return;
   went_well(rcl_action_notify_goal_done(entity_.get()));
+  goal.ended = news.state;
   goal.result = message_;
-  for (const rmw_request_id_t& asked : std::exchange(goal.results, {})) send_result(asked, goal.result);
+  for (const rmw_request_id_t& asked : std::exchange(goal.results, {}))
+    send_result(asked, goal.ended, goal.result);
 }
 
 void OfferedAction::publish_status() {
@@ -305,7 +352,7 @@ CalledAction::CalledAction(rcl_node_t& node, const ActionSettings& settings)
       goal_request_(type_.goal_request),
       goal_response_(type_.goal_response),
       result_request_(type_.result_request),
-      result_response_(type_.result_response),
+      result_response_(type_),
       feedback_(type_.feedback) {
   const rcl_action_client_options_t options = rcl_action_client_get_default_options();
   check(rcl_action_client_init(entity_.get(), &node, type_.action, settings.name.c_str(), &options),
@@ -361,7 +408,8 @@ bool CalledAction::send() {
   send_cancel();
   const GoalId id = random_id();
   std::uint32_t number = 0;
-  if (!client_->next_goal(id, serialized_, number)) return false;
+  if (!client_->next_goal(outgoing_, number)) return false;
+  insert_id(id, outgoing_);
   send_goal(id, number);
   return true;
 }
@@ -369,7 +417,7 @@ bool CalledAction::send() {
 void CalledAction::send_goal(const GoalId& id, std::uint32_t number) {
   const auto refuse = [&](GoalReason reason) { client_->give_up(number, reason, monotonic_now_ns()); };
   if (!has_server()) return refuse(GoalReason::no_server);
-  if (!goal_request_.deserialize(serialized_)) return refuse(GoalReason::malformed);
+  if (!goal_request_.deserialize(outgoing_)) return refuse(GoalReason::malformed);
   // The answer may come before this returns: it waits for the sequence number.
   const LockGuard lock(mutex_);
   goal_ = {.id = id, .number = number};
@@ -432,8 +480,9 @@ void CalledAction::take_answers() {
 void CalledAction::take_feedback() {
   while (went_well(rcl_action_take_feedback(entity_.get(), feedback_.get()))) {
     const Goal goal = present();
-    if (id_of(feedback_) == goal.id && feedback_.serialize(incoming_))
-      client_->feed_back(goal.number, incoming_.bytes(), monotonic_now_ns());
+    if (id_of(feedback_) != goal.id || !feedback_.serialize(incoming_)) continue;
+    cut_id(incoming_.bytes(), part_);
+    client_->feed_back(goal.number, part_, monotonic_now_ns());
   }
 }
 
@@ -455,8 +504,8 @@ void CalledAction::take_results() {
   rmw_request_id_t id{};
   while (went_well(rcl_action_take_result_response(entity_.get(), &id, result_response_.get()))) {
     const Goal goal = present();
-    if (id.sequence_number == goal.result && result_response_.serialize(incoming_))
-      client_->finish(goal.number, incoming_.bytes(), monotonic_now_ns());
+    if (id.sequence_number == goal.result && result_response_.serialize_result(incoming_))
+      client_->finish(goal.number, result_response_.state(), incoming_.bytes(), monotonic_now_ns());
   }
 }
 

@@ -42,12 +42,31 @@ class SteadyClock {
   rcl_clock_t clock_{};
 };
 
+/// The answer to a request for a result, whose result is a message of its own. [non-rt]
+class ResultResponse {
+ public:
+  explicit ResultResponse(const ActionTypeSupport& type);
+  void* get() const noexcept { return response_.get(); }
+  GoalState state() const noexcept;
+  void set_state(GoalState state) noexcept;
+  /// As of TypedMessage.
+  bool deserialize_result(std::vector<std::byte>& message);
+  bool serialize_result(OwnedMessage& into) const;
+
+ private:
+  void* result() const noexcept { return static_cast<std::byte*>(get()) + offset_; }
+
+  TypedMessage response_;
+  const rosidl_message_type_support_t* type_;
+  std::size_t offset_;
+};
+
 /// Offers a resource of kind action_server as a ROS action.
 ///
 /// | member               | used by                                  | under  |
 /// | -------------------- | ---------------------------------------- | ------ |
 /// | entity_, goals_      | who takes requests, who sends            | mutex_ (waiting needs none: rcl keeps the places in the wait set apart) |
-/// | goal_request_ ... result_request_, incoming_ | who takes requests | -      |
+/// | goal_request_ ... result_request_, incoming_, goal_ | who takes requests | - |
 /// | feedback_, message_  | who sends                                | -      |
 /// | goal_response_, result_response_ | both                         | mutex_ |
 class OfferedAction final : public Binding, private Arrival {
@@ -69,7 +88,8 @@ class OfferedAction final : public Binding, private Arrival {
     rmw_request_id_t asked{};                   // by which request
     rcl_action_goal_handle_t* handle{nullptr};  // of one that was accepted; rcl owns it
     std::vector<rmw_request_id_t> results{};    // requests that wait for the result
-    std::vector<std::byte> result{};            // of one that has ended
+    GoalState ended{GoalState::unknown};        // how it has ended
+    std::vector<std::byte> result{};            // then
   };
 
   void join(rcl_wait_set_t& set) override;
@@ -84,7 +104,8 @@ class OfferedAction final : public Binding, private Arrival {
   void answer(const rmw_request_id_t& asked, bool is_accepted) MAUVE_REQUIRES(mutex_);
   bool accept(const GoalId& id, Goal& goal) MAUVE_REQUIRES(mutex_);
   void follow(const GoalNews& news, Goal& goal) MAUVE_REQUIRES(mutex_);
-  void send_result(const rmw_request_id_t& asked, std::vector<std::byte>& result) MAUVE_REQUIRES(mutex_);
+  void send_result(const rmw_request_id_t& asked, GoalState ended, std::vector<std::byte>& result)
+      MAUVE_REQUIRES(mutex_);
   void publish_status() MAUVE_REQUIRES(mutex_);
 
   const ActionSettings settings_;
@@ -98,9 +119,10 @@ class OfferedAction final : public Binding, private Arrival {
   TypedMessage goal_request_;
   TypedMessage goal_response_;
   TypedMessage result_request_;
-  TypedMessage result_response_;
+  ResultResponse result_response_;
   TypedMessage feedback_;
   OwnedMessage incoming_;
+  std::vector<std::byte> goal_;
   std::vector<std::byte> message_;
   std::vector<std::byte> unknown_;  // the result of a goal that is not known
 };
@@ -110,7 +132,7 @@ class OfferedAction final : public Binding, private Arrival {
 /// | member                | written by            | read by       | under  |
 /// | --------------------- | --------------------- | ------------- | ------ |
 /// | goal_                 | who sends             | who receives  | mutex_ |
-/// | goal_request_, serialized_ | who sends        | -             | -      |
+/// | goal_request_, outgoing_ | who sends          | -             | -      |
 /// | the other messages    | who receives          | -             | -      |
 /// | unseen_since_ns_      | who sends             | -             | -      |
 class CalledAction final : public Binding, private Arrival {
@@ -160,10 +182,11 @@ class CalledAction final : public Binding, private Arrival {
   TypedMessage goal_request_;
   TypedMessage goal_response_;
   TypedMessage result_request_;
-  TypedMessage result_response_;
+  ResultResponse result_response_;
   TypedMessage feedback_;
-  std::vector<std::byte> serialized_;
+  std::vector<std::byte> outgoing_;
   OwnedMessage incoming_;
+  std::vector<std::byte> part_;
   mutable time_ns_t unseen_since_ns_{kForever};  // the server
 };
 

@@ -3,8 +3,10 @@
 
 #include <dlfcn.h>
 #include <rosidl_runtime_c/action_type_support_struct.h>
+#include <rosidl_typesupport_introspection_c/message_introspection.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <filesystem>
 #include <sstream>
@@ -17,6 +19,8 @@ namespace {
 
 constexpr const char* kTypeSupports = "rosidl_typesupport_c";
 constexpr const char* kStructs = "rosidl_generator_c";
+constexpr const char* kFields = "rosidl_typesupport_introspection_c";
+constexpr std::uint32_t kResultField = 1;  // of a GetResult_Response, behind the status
 
 std::string noun(const std::string& kind) {
   if (kind == "action") return "action";
@@ -52,6 +56,19 @@ class TypeName {
     const auto found = reinterpret_cast<Function>(dlsym(library, symbol.c_str()));
     if (found == nullptr) throw_unknown("package " + package_ + " without a " + kind_ + " " + name_);
     return found;
+  }
+  /// The type support of a part of the type, as the libraries of this suffix have it.
+  const rosidl_message_type_support_t* part_support(const std::string& suffix,
+                                                    const std::string& part) const {
+    using Getter = const rosidl_message_type_support_t* (*)();
+    return find<Getter>(suffix, suffix + "__get_message_type_support_handle__", part)();
+  }
+  /// Where a field begins in the struct of a part of the type.
+  std::size_t offset(const std::string& part, std::uint32_t field) const {
+    const auto* const fields = static_cast<const rosidl_typesupport_introspection_c__MessageMembers*>(
+        part_support(kFields, part)->data);
+    if (field >= fields->member_count_) throw_unknown(part + " without a field " + std::to_string(field));
+    return fields->members_[field].offset_;
   }
   /// What makes messages of a part of the type.
   MessageFunctions functions(const rosidl_message_type_support_t* support, const std::string& part) const {
@@ -117,7 +134,9 @@ ActionTypeSupport action_type_support(const std::string& type) {
           .goal_response = name.functions(goal.response_typesupport, "_SendGoal_Response"),
           .result_request = name.functions(result.request_typesupport, "_GetResult_Request"),
           .result_response = name.functions(result.response_typesupport, "_GetResult_Response"),
-          .feedback = name.functions(action->feedback_message_type_support, "_FeedbackMessage")};
+          .feedback = name.functions(action->feedback_message_type_support, "_FeedbackMessage"),
+          .result = name.part_support(kTypeSupports, "_Result"),
+          .result_offset = name.offset("_GetResult_Response", kResultField)};
 }
 
 }  // namespace mauve::bridge

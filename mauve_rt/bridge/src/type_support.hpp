@@ -5,6 +5,7 @@
 #include <rosidl_runtime_c/message_type_support_struct.h>
 #include <rosidl_runtime_c/service_type_support_struct.h>
 
+#include <cstddef>
 #include <string>
 
 struct rosidl_action_type_support_t;
@@ -42,6 +43,8 @@ struct ActionTypeSupport {
   MessageFunctions result_request;
   MessageFunctions result_response;
   MessageFunctions feedback;
+  const rosidl_message_type_support_t* result;  // of the result alone
+  std::size_t result_offset;                    // where it begins in the struct of a result_response
 };
 
 /// Of `package/action/Type`. [non-rt] Throws Error (unknown_type) when it is not installed.

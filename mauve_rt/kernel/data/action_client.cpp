@@ -16,6 +16,12 @@ void ActionClientBase::set_name(const std::string& name) {
   mutex_.set_trace_id(TraceNames::intern(name));
 }
 
+void ActionClientBase::offer_all(ServiceBase& goal, ServiceBase& feedback, ServiceBase& result) {
+  for (ServiceBase* const service :
+       std::initializer_list<ServiceBase*>{&goal, &decide, &status, &feedback, &result})
+    offer(*service);
+}
+
 ActionCounts ActionClientBase::counts() const {
   const LockGuard lock(mutex_);
   return counts_;
@@ -77,7 +83,7 @@ void ActionClientBase::cancel_locked(time_ns_t time_ns) noexcept {
 
 // ---- who carries goals
 
-bool ActionClientBase::next_goal(const GoalId& id, std::vector<std::byte>& request, std::uint32_t& number) {
+bool ActionClientBase::next_goal(std::vector<std::byte>& message, std::uint32_t& number) {
   {
     const LockGuard lock(mutex_);
     if (!is_to_send_) return false;
@@ -85,7 +91,7 @@ bool ActionClientBase::next_goal(const GoalId& id, std::vector<std::byte>& reque
     number = number_;
     copy_goal();
   }
-  put_goal(id, request);
+  put_goal(message);
   return true;
 }
 
@@ -130,10 +136,9 @@ void ActionClientBase::feed_back(std::uint32_t number, std::span<const std::byte
   written(now_ns);
 }
 
-void ActionClientBase::finish(std::uint32_t number, std::span<const std::byte> response, time_ns_t now_ns) {
-  std::int8_t ended = 0;
-  if (!take_in_result(response, ended)) return give_up(number, GoalReason::malformed, now_ns);
-  const auto state = static_cast<GoalState>(ended);
+void ActionClientBase::finish(std::uint32_t number, GoalState state, std::span<const std::byte> result,
+                              time_ns_t now_ns) {
+  if (!take_in_result(result)) return give_up(number, GoalReason::malformed, now_ns);
   if (state < GoalState::succeeded || state > GoalState::aborted)  // it does not know the goal
     return give_up(number, GoalReason::no_server, now_ns);
   {
@@ -188,13 +193,13 @@ TryWrite ActionClientBase::try_ask_to_cancel(time_ns_t time_ns) noexcept {
   return TryWrite::done;
 }
 
-DataStatus ActionClientBase::read_status(ActionGoal& status, time_ns_t& time_ns,
+DataStatus ActionClientBase::read_status(ActionGoal& value, time_ns_t& time_ns,
                                          ReaderState& reader) noexcept {
   const LockGuard lock(mutex_);
   if (number_ == 0) return DataStatus::none;
-  status = {.number = number_,
-            .state = static_cast<std::uint8_t>(state_),
-            .reason = static_cast<std::uint8_t>(reason_)};
+  value = {.number = number_,
+           .state = static_cast<std::uint8_t>(state_),
+           .reason = static_cast<std::uint8_t>(reason_)};
   time_ns = changed_ns_;
   return reader.look(sequence_);
 }
@@ -206,8 +211,10 @@ ResourceKind ActionClientKind::describe() {
                           .description = "a goal that the server has not answered by then is rejected",
                           .unit = "ns",
                           .minimum = 1,
-                          .file_key = "action.answer_ms"}},
-          .type = TypeNeed::action};
+                          .file_key = "action.answer_ms"},
+                         max_bytes_parameter()},
+          .type = TypeNeed::action,
+          .values = 6};  // a goal, a result and feedback, each here and on its way
 }
 
 }  // namespace mauve

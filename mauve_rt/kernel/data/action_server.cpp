@@ -11,7 +11,11 @@ namespace mauve {
 namespace {
 
 constexpr time_ns_t kServedEvery = ms_to_ns(100);  // so often it is looked whether a component still serves
-constexpr std::size_t kEndedGoals = 2;             // places for goals that have ended, and were not told yet
+constexpr std::size_t kEndedGoals = 2;  // places for goals that have ended, and are not reported yet
+constexpr std::size_t kPlacesPerGoal = 2;
+constexpr std::size_t kValuesPerPlace = 2;  // a goal and its result
+constexpr std::size_t kValuesBesides =
+    5;  // the result and the feedback that are written, and what goes in and out
 
 /// Whether a component may take a goal from one state to the other.
 bool fits(GoalState from, GoalState to) noexcept {
@@ -63,13 +67,21 @@ ActionServerBase::ActionServerBase(std::string type, std::int64_t goals, time_ns
     : Resource("action_server", std::move(type)),
       goals_(static_cast<std::size_t>(goals)),
       answer_ns_(answer_ns),
-      places_(2 * goals_ + kEndedGoals) {
+      places_(kPlacesPerGoal * goals_ + kEndedGoals) {
   MAUVE_EXPECTS(goals >= 1 && goals <= kMostGoals && answer_ns >= 1);  // checked with the kind's parameters
 }
 
 void ActionServerBase::set_name(const std::string& name) {
   Resource::set_name(name);
   mutex_.set_trace_id(TraceNames::intern(name));
+}
+
+void ActionServerBase::offer_all(ServiceBase& goal, ServiceBase& asked, ServiceBase& feedback,
+                                 ServiceBase& result) {
+  asked_ = &asked;
+  for (ServiceBase* const service :
+       std::initializer_list<ServiceBase*>{&status, &goal, &asked, &decide, &feedback, &result})
+    offer(*service);
 }
 
 ActionCounts ActionServerBase::counts() const {
@@ -155,8 +167,8 @@ void ActionServerBase::changed(time_ns_t now_ns) noexcept {
 
 // ---- who carries goals
 
-GoalReason ActionServerBase::ask(std::span<const std::byte> request, GoalId& id, time_ns_t now_ns) {
-  if (!take_in(request, id)) return GoalReason::malformed;
+GoalReason ActionServerBase::ask(const GoalId& id, std::span<const std::byte> message, time_ns_t now_ns) {
+  if (!take_in(message)) return GoalReason::malformed;
   {
     const LockGuard lock(mutex_);
     const auto room =
@@ -228,8 +240,8 @@ bool ActionServerBase::next_news(GoalNews& news, std::vector<std::byte>& message
       place.is_used = false;
     }
   }
-  if (news.has_feedback) put_feedback(news.id, message);
-  if (news.has_result) put_result(news.state, message);
+  if (news.has_feedback) put_feedback(message);
+  if (news.has_result) put_result(message);
   return true;
 }
 
@@ -269,7 +281,7 @@ void ActionServerBase::close(time_ns_t now_ns) {
 
 // ---- the component
 
-DataStatus ActionServerBase::read_status(ActionGoal& status, time_ns_t& time_ns,
+DataStatus ActionServerBase::read_status(ActionGoal& value, time_ns_t& time_ns,
                                          ReaderState& reader) noexcept {
   bool has_accepted = false;
   DataStatus found{};
@@ -282,13 +294,13 @@ DataStatus ActionServerBase::read_status(ActionGoal& status, time_ns_t& time_ns,
       }
     }
     const std::size_t asked = oldest(GoalState::unknown);
-    status = {.asked = asked == kNone ? 0 : places_[asked].number};
+    value = {.asked = asked == kNone ? 0 : places_[asked].number};
     if (current_ != kNone) {
-      status.number = places_[current_].number;
-      status.state = static_cast<std::uint8_t>(places_[current_].state);
+      value.number = places_[current_].number;
+      value.state = static_cast<std::uint8_t>(places_[current_].state);
     }
     for (const Place& place : places_)
-      status.waiting += place.is_used && place.state == GoalState::accepted ? 1U : 0U;
+      value.waiting += place.is_used && place.state == GoalState::accepted ? 1U : 0U;
     time_ns = changed_ns_;
     found = reader.look(sequence_);
   }
@@ -296,7 +308,7 @@ DataStatus ActionServerBase::read_status(ActionGoal& status, time_ns_t& time_ns,
   return found;
 }
 
-bool ActionServerBase::decide(const ActionGoal& decision, time_ns_t time_ns) noexcept {
+bool ActionServerBase::take_decision(const ActionGoal& decision, time_ns_t time_ns) noexcept {
   bool fits = true;
   {
     const LockGuard lock(mutex_);
@@ -306,7 +318,7 @@ bool ActionServerBase::decide(const ActionGoal& decision, time_ns_t time_ns) noe
   return fits;
 }
 
-TryWrite ActionServerBase::try_decide(const ActionGoal& decision, time_ns_t time_ns) noexcept {
+TryWrite ActionServerBase::try_decision(const ActionGoal& decision, time_ns_t time_ns) noexcept {
   {
     if (!mutex_.try_lock()) return TryWrite::busy;
     const LockGuard lock(mutex_, std::adopt_lock);
@@ -346,14 +358,17 @@ ResourceKind ActionServerKind::describe() {
                       .initial = std::int64_t{1},
                       .description = "so many goals at once, the executed one among them; more are rejected",
                       .minimum = 1,
-                      .maximum = static_cast<double>(kMostGoals)},
+                      .maximum = static_cast<double>(kMostGoals),
+                      .values_each = kPlacesPerGoal * kValuesPerPlace},
                      {.name = "answer_ns",
                       .initial = kDefaultAnswerTime,
                       .description = "a goal that the component has not answered by then is rejected",
                       .unit = "ns",
                       .minimum = 1,
-                      .file_key = "action.answer_ms"}},
-      .type = TypeNeed::action};
+                      .file_key = "action.answer_ms"},
+                     max_bytes_parameter()},
+      .type = TypeNeed::action,
+      .values = kEndedGoals * kValuesPerPlace + kValuesBesides};
 }
 
 }  // namespace mauve

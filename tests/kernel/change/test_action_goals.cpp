@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: LGPL-3.0-or-later
 // A goal under way: it survives a replacement of the core that executes it, and ends with a reason when its component does.
+#include "mauve_rt/data/goal_sender.hpp"
+
 #include "data/action_types.hpp"
 #include "hosts.hpp"
 
@@ -97,6 +99,34 @@ TYPED_TEST(ActionGoals, AreExecutedByAComponent) {
   EXPECT_EQ(succeeded, this->states[1].back());
   EXPECT_EQ(20, this->carrier->results[1]);
   EXPECT_TRUE(std::is_sorted(this->carrier->feedback.begin(), this->carrier->feedback.end()));
+}
+
+TYPED_TEST(ActionGoals, AreSentAndFollowedByAProgram) {
+  this->deploy_walker();
+  GoalSender<Walk> sender(*this->server, [this] { return (*this->host).now_ns(); });
+  const std::uint64_t first = sender.ask({.steps = 1'000'000}), second = sender.ask({.steps = 3});
+  const std::uint64_t third = sender.ask({.steps = 1});
+  std::vector<GoalSender<Walk>::News> news = sender.news();
+  ASSERT_FALSE(news.empty());
+  EXPECT_EQ(third, news.front().goal);
+  EXPECT_EQ(GoalReason::full, news.front().reason);
+  const auto find = [&](std::uint64_t goal, const auto& is_wanted) {
+    return [&, goal] {
+      for (const auto& each : sender.news()) news.push_back(each);
+      return std::any_of(news.begin(), news.end(),
+                         [&](const auto& each) { return each.goal == goal && is_wanted(each); });
+    };
+  };
+  this->host.until(find(first, [](const auto& each) { return each.feedback && each.feedback->step > 2; }),
+                   "a step");
+  EXPECT_TRUE(sender.cancel(first));
+  this->host.until(
+      find(first, [](const auto& each) { return each.state == canceled && each.result->steps > 2; }),
+      "the end of the first goal");
+  this->host.until(
+      find(second, [](const auto& each) { return each.state == succeeded && each.result->steps == 3; }),
+      "the end of the second goal");
+  EXPECT_FALSE(sender.cancel(second)) << "it has ended";
 }
 
 TYPED_TEST(ActionGoals, SurviveAReplacementOfTheCore) {

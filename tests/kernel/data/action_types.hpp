@@ -45,14 +45,9 @@ struct GoalCarrier {
   explicit GoalCarrier(ActionServerBase& asked) : server(asked) {}
 
   GoalReason ask(std::uint8_t number, std::int64_t steps, time_ns_t now_ns = 0) {
-    std::vector<std::byte> request;
-    CdrWriter writer(request);
-    writer.put(goal_id(number));
-    writer.put(Walk::Goal{steps});
-    GoalId id{};
-    const GoalReason reason = server.ask(request, id, now_ns);
-    EXPECT_EQ(goal_id(number), id);
-    return reason;
+    std::vector<std::byte> message;
+    CdrWriter(message).put(Walk::Goal{steps});
+    return server.ask(goal_id(number), message, now_ns);
   }
   /// All states that were told since the last call, by goal.
   std::map<int, std::vector<GoalState>> take() {
@@ -62,20 +57,16 @@ struct GoalCarrier {
     while (server.next_news(news, message)) {
       CdrReader reader(message);
       if (news.has_feedback) {
-        GoalId id{};
         Walk::Feedback value;
-        EXPECT_TRUE(reader.get(id) && reader.get(value));
-        EXPECT_EQ(news.id, id);
+        EXPECT_TRUE(reader.get(value));
         feedback.push_back(value.step);
         continue;
       }
       states[news.id[0]].push_back(news.state);
       reasons[news.id[0]] = news.reason;
       if (!news.has_result) continue;
-      std::int8_t state = 0;
       Walk::Result value;
-      EXPECT_TRUE(reader.get(state) && reader.get(value));
-      EXPECT_EQ(static_cast<int>(news.state), state);
+      EXPECT_TRUE(reader.get(value));
       results[news.id[0]] = value.steps;
     }
     return states;

@@ -81,9 +81,8 @@ TEST_F(ActionServers, RejectsMoreGoalsThanAllowed) {
 }
 
 TEST_F(ActionServers, RejectsAGoalThatIsNoMessageOfTheType) {
-  GoalId id{};
   const std::vector<std::byte> nonsense(7, std::byte{1});
-  EXPECT_EQ(GoalReason::malformed, server.ask(nonsense, id, 0));
+  EXPECT_EQ(GoalReason::malformed, server.ask(goal_id(1), nonsense, 0));
 }
 
 TEST_F(ActionServers, RejectsAGoalThatIsNotAnsweredInTime) {

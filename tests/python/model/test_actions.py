@@ -8,8 +8,9 @@ import pytest
 from mauve_msgs.action import DriveTo
 from mauve_msgs.msg import ActionGoal
 from mauve_rt._kernel import PluginRegistry, Simulation
-from mauve_rt.api import Core, PeriodicFsm, Shell, ms_to_ns, read_port, write_port
+from mauve_rt.api import AnyResource, Core, PeriodicFsm, Shell, ms_to_ns, read_port, write_port
 from mauve_rt.cli.main import main
+from mauve_rt.control.limits import bytes_of_resource
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import ArchitectureModel, PluginIndex, build, configure, load_architecture
 from mauve_rt.model.plugins import PluginLoader
@@ -138,15 +139,29 @@ def test_components_in_python_use_a_server_and_a_client(
     assert Send.seen == (1, ActionGoal.UNKNOWN), "the first goal waits for the answer of a server"
 
 
-def test_the_time_for_an_answer_is_a_parameter_of_the_kind(tmp_path: Path) -> None:
+def test_the_time_for_an_answer_is_a_parameter_of_the_kind(tmp_path: Path, plugin_prefix: Path) -> None:
     resources = loaded(tmp_path, GOOD).resources
-    assert resource_part(resources["drive"], PluginRegistry()) == {
+    registry = PluginRegistry()
+    PluginLoader(registry, PluginIndex.installed()).require("action_type", "mauve_msgs/action/DriveTo")
+    assert resource_part(resources["drive"], registry) == {
         "kind": "action_server",
         "type": "mauve_msgs/action/DriveTo",
         "goals": 4,
         "answer_ns": 50_000_000,
     }
-    assert "answer_ns" not in resource_part(resources["send"], PluginRegistry()), "the kernel's own"
+    assert "answer_ns" not in resource_part(resources["send"], registry), "the kernel's own"
+
+
+def test_serialized_goals_count_as_memory_of_requests(tmp_path: Path, plugin_prefix: Path) -> None:
+    resources = loaded(tmp_path, GOOD).resources
+    registry = PluginRegistry()
+    part = resource_part(resources["drive"], registry)
+    assert isinstance(part["resource"], AnyResource), "no library registers the type: it is held serialized"
+    max_bytes, goals = 65_536, 4
+    assert bytes_of_resource(resources["drive"], registry) >= 2 * goals * 2 * max_bytes
+    assert bytes_of_resource(resources["send"], registry) >= 3 * max_bytes
+    PluginLoader(registry, PluginIndex.installed()).require("action_type", "mauve_msgs/action/DriveTo")
+    assert bytes_of_resource(resources["drive"], registry) == 0
 
 
 def test_each_kind_of_types_has_an_example_that_is_installed(plugin_prefix: Path) -> None:

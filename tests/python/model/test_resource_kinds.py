@@ -79,8 +79,8 @@ def test_the_given_kinds_tell_what_files_may_say_of_them() -> None:
         "latest_value": ["max_readers"],
         "event": [],
         "client": ["service.timeout_ms"],
-        "action_server": ["goals", "action.answer_ms"],
-        "action_client": ["action.answer_ms"],
+        "action_server": ["goals", "action.answer_ms", "max_bytes"],
+        "action_client": ["action.answer_ms", "max_bytes"],
         "transform_tree": ["frames", "history", "static_topic"],
     }
     assert all(each.description for kind in given_kinds().values() for each in kind.parameters)

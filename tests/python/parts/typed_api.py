@@ -11,6 +11,10 @@ from mauve_msgs.srv import LookupTransform
 from mauve_rt.api import (
     FOREVER,
     NOT_MEASURED,
+    ActionClient,
+    ActionClientPorts,
+    ActionServer,
+    ActionServerPorts,
     AnyResource,
     Architecture,
     ArchitectureDescription,
@@ -23,6 +27,10 @@ from mauve_rt.api import (
     EventCounter,
     EventPort,
     Fsm,
+    GoalNews,
+    GoalReason,
+    GoalSender,
+    GoalState,
     Host,
     LatestValue,
     MauveError,
@@ -51,6 +59,8 @@ from mauve_rt.api import (
     TransformLookup,
     TransformTree,
     WritePort,
+    action_client,
+    action_server,
     call_port,
     event_port,
     monotonic_ns,
@@ -74,6 +84,26 @@ class Pose:
     """Stands for a message class that has types."""
 
     x: float = 0.0
+
+
+class DriveGoal:
+    x: float = 0.0
+
+
+class DriveResult:
+    reached: bool = False
+
+
+class DriveFeedback:
+    left: float = 0.0
+
+
+class Drive:
+    """Stands for a class of an action that has types."""
+
+    Goal = DriveGoal
+    Result = DriveResult
+    Feedback = DriveFeedback
 
 
 class Map(Resource):
@@ -147,6 +177,36 @@ class HoverCore(Core[HoverShell]):
 
     def is_high(self) -> bool:
         return self.height > 1.0
+
+
+class DriveShell(Shell):
+    drive = action_server(Drive)
+    other = action_client(Drive)
+
+
+class DriveCore(Core[DriveShell]):
+    def act(self) -> None:
+        drive, other = self.shell.drive, self.shell.other
+        assert_type(drive, ActionServerPorts[DriveGoal, DriveResult, DriveFeedback])
+        assert_type(other, ActionClientPorts[DriveGoal, DriveResult, DriveFeedback])
+        assert_type(drive.goal(), Sample[DriveGoal])
+        assert_type(other.result(), Sample[DriveResult])
+        assert_type(other.feedback().value.left, float)
+        assert_type(other.reason(), GoalReason)
+        if drive.state() == GoalState.CANCELING and not drive.state().is_final:
+            assert_type(drive.cancel(), bool)
+        drive.feedback(Drive.Feedback())
+        drive.succeed(Drive.Result())
+        other.send(Drive.Goal())
+        drive.succeed(Drive.Goal())  # type: ignore[arg-type]
+        other.send(Drive.Result())  # type: ignore[arg-type]
+
+
+def send(host: Host) -> None:
+    sender = GoalSender(host, "drive", Drive)
+    assert_type(sender.ask(Drive.Goal()), int)
+    assert_type(sender.news(), list[GoalNews[DriveResult, DriveFeedback]])
+    sender.ask(Drive.Feedback())  # type: ignore[arg-type]
 
 
 class OtherCore(Core[HoverShell]):
@@ -273,6 +333,8 @@ def run(registry: PluginRegistry) -> StepReport:
         "latest": LatestValue("geometry_msgs/msg/Pose2D", max_readers=2),
         "count": EventCounter(),
         "frames": TransformTree(frames=8, history=10),
+        "drive": ActionServer(Drive, goals=2, max_bytes=100),
+        "other": ActionClient(Drive, answer_ns=1),
         "map": Map(),
     }
     for name, resource in resources.items():

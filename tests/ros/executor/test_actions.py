@@ -1,5 +1,6 @@
 """ROS actions: an executor serves goals of rclpy's client, and sends goals to rclpy's server."""
 
+import os
 import threading
 import time
 from collections.abc import Callable
@@ -92,12 +93,25 @@ class Rider:
         self.graph.spin_until(condition, what)
 
 
+@pytest.fixture(params=["executor_tests", "action_tests"], ids=["cpp", "python"])
+def parts(request: pytest.FixtureRequest) -> str:
+    """The package of the parts: in C++ with the action's type, or in Python without a library of the type."""
+    return str(request.param)
+
+
 @pytest.fixture
-def serve(start_executor: Callable[..., Any], tmp_path: Path, plugin_prefix: Path) -> Callable[..., Any]:
+def serve(
+    start_executor: Callable[..., Any], tmp_path: Path, plugin_prefix: Path, action_prefix: Path, parts: str
+) -> Callable[..., Any]:
+    searched = os.environ["AMENT_PREFIX_PATH"].split(os.pathsep)
+    if parts == "action_tests":
+        searched = [str(action_prefix), *(each for each in searched if each != str(plugin_prefix))]
+
     def start(text: str = SERVER) -> Any:
         path = tmp_path / "actions.yaml"
-        path.write_text(text, encoding="utf-8")
-        return start_executor("-p", f"architecture:={path}")
+        path.write_text(text.replace("executor_tests/", f"{parts}/"), encoding="utf-8")
+        environment = {"AMENT_PREFIX_PATH": os.pathsep.join(searched)}
+        return start_executor("-p", f"architecture:={path}", environment=environment)
 
     return start
 
@@ -148,12 +162,10 @@ def test_a_goal_is_canceled(rider: Rider) -> None:
     assert not late.goals_canceling
 
 
-def test_a_goal_survives_a_replacement_of_the_core(rider: Rider) -> None:
+def test_a_goal_survives_a_replacement_of_the_core(rider: Rider, parts: str) -> None:
     (handle,) = rider.ask(400.0)
     rider.until(lambda: len(rider.left) > 3, "feedback")
-    reply = rider.graph.ask(
-        ReplaceCore, f"{NODE}/replace_core", component="driver", core="executor_tests/Driver"
-    )
+    reply = rider.graph.ask(ReplaceCore, f"{NODE}/replace_core", component="driver", core=f"{parts}/Driver")
     assert reply.success, reply.message
     ended = rider.result(handle)
     assert (ended.status, ended.result.reached) == (GoalStatus.STATUS_SUCCEEDED, True)
@@ -281,7 +293,7 @@ def test_a_component_sends_goals(serve: Callable[..., Any], graph: Any) -> None:
     until(4, ActionGoal.REJECTED, ActionGoal.NO_SERVER)
 
 
-def test_a_transaction_adds_an_action(serve: Callable[..., Any], graph: Any) -> None:
+def test_a_transaction_adds_an_action(serve: Callable[..., Any], graph: Any, parts: str) -> None:
     serve(OTHER)
     steps = [
         ReconfigurationStep(
@@ -292,7 +304,7 @@ def test_a_transaction_adds_an_action(serve: Callable[..., Any], graph: Any) -> 
         ReconfigurationStep(
             kind="add_component",
             target="driver",
-            value=DRIVER,
+            value=DRIVER.replace("executor_tests/", f"{parts}/"),
         ),
         *(
             ReconfigurationStep(kind="connect", target="driver", name=f"drive_{port}", value=f"drive.{port}")

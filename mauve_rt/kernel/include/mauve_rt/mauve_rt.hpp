@@ -24,6 +24,7 @@
 #include "mauve_rt/data/client.hpp"
 #include "mauve_rt/data/event_counter.hpp"
 #include "mauve_rt/data/frames.hpp"
+#include "mauve_rt/data/goal_sender.hpp"
 #include "mauve_rt/data/latest_value.hpp"
 #include "mauve_rt/data/message_shape.hpp"
 #include "mauve_rt/data/port.hpp"

@@ -41,16 +41,16 @@ class ActionClientBase : public Resource {
 
   // ---- who carries goals: one thread sends, one receives
 
-  /// The goal to be sent, once each, with that id, as rosidl's <Type>_SendGoal_Request; false: none. [non-rt]
-  bool next_goal(const GoalId& id, std::vector<std::byte>& request, std::uint32_t& number);
+  /// The goal to be sent, once each, as rosidl's <Type>_Goal; false: none. [non-rt]
+  bool next_goal(std::vector<std::byte>& message, std::uint32_t& number);
   /// Whether the component asks to cancel a goal that was accepted, once each; false: it does not. [non-rt]
   bool next_cancel(std::uint32_t& number);
-  /// The server's answer, another state, feedback (<Type>_FeedbackMessage), the end (<Type>_GetResult_Response). Of any other
-  /// goal than the present one: nothing happens. A message that does not fit ends the goal as malformed. [non-rt]
+  /// The server's answer, another state, feedback (<Type>_Feedback), the end (<Type>_Result). Of any other goal than the present
+  /// one: nothing happens. A message that does not fit ends the goal as malformed. [non-rt]
   void answer(std::uint32_t number, bool is_accepted, time_ns_t now_ns);
   void set_state(std::uint32_t number, GoalState state, time_ns_t now_ns);
   void feed_back(std::uint32_t number, std::span<const std::byte> feedback, time_ns_t now_ns);
-  void finish(std::uint32_t number, std::span<const std::byte> response, time_ns_t now_ns);
+  void finish(std::uint32_t number, GoalState state, std::span<const std::byte> result, time_ns_t now_ns);
   /// Ends the goal: rejected before it was accepted, else aborted. [non-rt]
   void give_up(std::uint32_t number, GoalReason reason, time_ns_t now_ns);
   /// The number of the goal that has not ended; 0: there is none. [non-rt]
@@ -59,13 +59,15 @@ class ActionClientBase : public Resource {
   time_ns_t look(time_ns_t now_ns);
 
  protected:
+  /// Offers all services, these of the action's own types among them. [setup]
+  void offer_all(ServiceBase& goal, ServiceBase& feedback, ServiceBase& result);
   /// Copies the goal to a place of its own. [rt] Under mutex_.
   virtual void copy_goal() MAUVE_RT = 0;
   /// That copy as a message. [non-rt]
-  virtual void put_goal(const GoalId& id, std::vector<std::byte>& request) const = 0;
+  virtual void put_goal(std::vector<std::byte>& message) const = 0;
   /// Reads a message into a place of its own; false: malformed. [non-rt]
   virtual bool take_in_feedback(std::span<const std::byte> message) = 0;
-  virtual bool take_in_result(std::span<const std::byte> response, std::int8_t& state) = 0;
+  virtual bool take_in_result(std::span<const std::byte> message) = 0;
   /// Keeps what was taken in. [rt] Under mutex_.
   virtual void keep_feedback() MAUVE_RT = 0;
   virtual void keep_result() MAUVE_RT = 0;
@@ -88,10 +90,7 @@ class ActionClientBase : public Resource {
     notify();
     return true;
   }
-  bool ask_to_cancel(time_ns_t time_ns) MAUVE_RT;
-  TryWrite try_ask_to_cancel(time_ns_t time_ns) MAUVE_RT;
   /// As ReadService::read(); `copy` runs under mutex_. [rt]
-  DataStatus read_status(ActionGoal& status, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
   template <typename Copy>
   DataStatus read_feedback(Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     const LockGuard lock(mutex_);
@@ -111,9 +110,40 @@ class ActionClientBase : public Resource {
   WriteFloor& floor() MAUVE_RT { return floor_; }
 
  private:
+  /// The services that are the same for all actions.
+  class Status final : public ReadService<ActionGoal> {
+   public:
+    explicit Status(ActionClientBase& owner) : ReadService<ActionGoal>("status"), owner_(owner) {}
+    DataStatus read(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      return owner_.read_status(value, time_ns, reader);
+    }
+
+   private:
+    ActionClientBase& owner_;
+  };
+  class Decide final : public WriteService<ActionGoal> {
+   public:
+    explicit Decide(ActionClientBase& owner) : WriteService<ActionGoal>("decide"), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return 1; }
+    bool write(const ActionGoal& /*decision*/, time_ns_t time_ns) noexcept override {
+      return owner_.ask_to_cancel(time_ns);
+    }
+    TryWrite try_write(const ActionGoal& /*decision*/, time_ns_t time_ns) noexcept override {
+      return owner_.try_ask_to_cancel(time_ns);
+    }
+    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
+    void forget_floor() noexcept override { owner_.floor().forget(); }
+
+   private:
+    ActionClientBase& owner_;
+  };
+
+  DataStatus read_status(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
+  bool ask_to_cancel(time_ns_t time_ns) MAUVE_RT;
+  TryWrite try_ask_to_cancel(time_ns_t time_ns) MAUVE_RT;
   bool is_open() const noexcept { return number_ != 0 && !is_final(state_); }
   bool is_present(std::uint32_t number) const noexcept { return is_open() && number == number_; }
-  void begin(time_ns_t time_ns) noexcept;
+  void begin(time_ns_t time_ns) MAUVE_RT;
   void cancel_locked(time_ns_t time_ns) noexcept;
   void enter(GoalState state, GoalReason reason, time_ns_t now_ns) noexcept;
 
@@ -133,6 +163,10 @@ class ActionClientBase : public Resource {
   time_ns_t feedback_ns_{0};
   std::uint32_t result_of_{0};  // the goal whose result is there
   ActionCounts counts_;
+
+ public:
+  Decide decide{*this};
+  Status status{*this};
 };
 
 /// Offers `goal` and `decide` to write, `status`, `feedback` and `result` to read.
@@ -145,26 +179,17 @@ class ActionClient final : public ActionClientBase {
 
   explicit ActionClient(time_ns_t answer_ns = s_to_ns(1))
       : ActionClientBase(std::string(ActionTraits<A>::name), answer_ns) {
-    for (ServiceBase* const service :
-         std::initializer_list<ServiceBase*>{&goal, &decide, &status, &feedback, &result})
-      offer(*service);
+    offer_all(goal, feedback, result);
   }
 
  protected:
   void copy_goal() noexcept override { *goal_out_ = goal_; }
-  void put_goal(const GoalId& id, std::vector<std::byte>& request) const override {
-    CdrWriter writer(request);
-    writer.put(id);
-    writer.put(*goal_out_);
-  }
+  void put_goal(std::vector<std::byte>& message) const override { CdrWriter(message).put(*goal_out_); }
   bool take_in_feedback(std::span<const std::byte> message) override {
-    CdrReader reader(message);
-    GoalId id{};
-    return reader.get(id) && reader.get(*feedback_in_);
+    return CdrReader(message).get(*feedback_in_);
   }
-  bool take_in_result(std::span<const std::byte> response, std::int8_t& state) override {
-    CdrReader reader(response);
-    return reader.get(state) && reader.get(*result_in_);
+  bool take_in_result(std::span<const std::byte> message) override {
+    return CdrReader(message).get(*result_in_);
   }
   void keep_feedback() noexcept override { feedback_ = *feedback_in_; }
   void keep_result() noexcept override { result_ = *result_in_; }
@@ -197,30 +222,10 @@ class ActionClient final : public ActionClientBase {
    private:
     ActionClient& owner_;
   };
-  class Decide final : public WriteService<ActionGoal> {
-   public:
-    explicit Decide(ActionClient& owner) : WriteService<ActionGoal>("decide"), owner_(owner) {}
-    std::uint32_t max_ports() const noexcept override { return 1; }
-    bool write(const ActionGoal& /*decision*/, time_ns_t time_ns) noexcept override {
-      return owner_.ask_to_cancel(time_ns);
-    }
-    TryWrite try_write(const ActionGoal& /*decision*/, time_ns_t time_ns) noexcept override {
-      return owner_.try_ask_to_cancel(time_ns);
-    }
-    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
-    void forget_floor() noexcept override { owner_.floor().forget(); }
-
-   private:
-    ActionClient& owner_;
-  };
-
-  DataStatus find_status(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-    return read_status(value, time_ns, reader);
-  }
-  DataStatus find_feedback(Feedback& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+  DataStatus find_feedback(Feedback& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     return read_feedback([&]() noexcept { value = feedback_; }, time_ns, reader);
   }
-  DataStatus find_result(Result& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+  DataStatus find_result(Result& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     return read_result([&]() noexcept { value = result_; }, time_ns, reader);
   }
 
@@ -235,8 +240,6 @@ class ActionClient final : public ActionClientBase {
 
  public:
   SendGoal goal{*this};
-  Decide decide{*this};
-  Read<ActionGoal, &ActionClient::find_status> status{*this, "status"};
   Read<Feedback, &ActionClient::find_feedback> feedback{*this, "feedback"};
   Read<Result, &ActionClient::find_result> result{*this, "result"};
 };

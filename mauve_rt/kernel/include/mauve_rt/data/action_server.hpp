@@ -68,16 +68,15 @@ class ActionServerBase : public Resource {
 
   // ---- who carries goals; asks and cancels on one thread
 
-  /// A goal comes, as rosidl's <Type>_SendGoal_Request; writes its id. None when it waits for its answer now, else why it is
-  /// rejected at once. [non-rt]
-  GoalReason ask(std::span<const std::byte> request, GoalId& id, time_ns_t now_ns);
+  /// A goal comes, as rosidl's <Type>_Goal. None when it waits for its answer now, else why it is rejected at once. [non-rt]
+  GoalReason ask(const GoalId& id, std::span<const std::byte> message, time_ns_t now_ns);
   /// Its client asks to cancel a goal; false: no such goal is accepted and has not ended. [non-rt]
   bool cancel(const GoalId& id, time_ns_t now_ns);
 
   // ---- the same, on one thread
 
   /// What is to be told of a goal, the oldest goal first; false: nothing. A final state is given once, then the goal is forgotten.
-  /// `message`: the feedback, as rosidl's <Type>_FeedbackMessage, or of a goal that has ended the <Type>_GetResult_Response.
+  /// `message`: the feedback, as rosidl's <Type>_Feedback, or of a goal that has ended its <Type>_Result.
   /// [non-rt]
   bool next_news(GoalNews& news, std::vector<std::byte>& message);
   /// Ends what took too long, or what no component serves any more; returns when to look again. [non-rt]
@@ -86,11 +85,10 @@ class ActionServerBase : public Resource {
   void close(time_ns_t now_ns);
 
  protected:
-  /// Whether a port decides about goals, and whether one looks at those that wait for an answer. [rt]
-  virtual bool is_served() const MAUVE_RT = 0;
-  virtual bool has_judge() const MAUVE_RT = 0;
-  /// Reads a request into a place of its own; false: malformed. [non-rt]
-  virtual bool take_in(std::span<const std::byte> request, GoalId& id) = 0;
+  /// Offers all services, these of the action's own types among them. [setup]
+  void offer_all(ServiceBase& goal, ServiceBase& asked, ServiceBase& feedback, ServiceBase& result);
+  /// Reads a goal into a place of its own; false: malformed. [non-rt]
+  virtual bool take_in(std::span<const std::byte> message) = 0;
   /// Keeps the goal that was taken in; keeps the present result as that goal's, and begins another one. [rt] Under mutex_.
   virtual void keep_goal(std::size_t place) MAUVE_RT = 0;
   virtual void keep_result(std::size_t place) MAUVE_RT = 0;
@@ -98,13 +96,12 @@ class ActionServerBase : public Resource {
   virtual void copy_feedback() MAUVE_RT = 0;
   virtual void copy_result(std::size_t place) MAUVE_RT = 0;
   /// Those copies as messages. [non-rt]
-  virtual void put_feedback(const GoalId& id, std::vector<std::byte>& message) const = 0;
-  virtual void put_result(GoalState state, std::vector<std::byte>& message) const = 0;
+  virtual void put_feedback(std::vector<std::byte>& message) const = 0;
+  virtual void put_result(std::vector<std::byte>& message) const = 0;
 
   // ---- the component
 
   /// As ReadService::read(). `copy` gets the place of the goal, under mutex_. [rt]
-  DataStatus read_status(ActionGoal& status, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
   template <typename Copy>
   DataStatus read_goal(Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     const LockGuard lock(mutex_);
@@ -115,9 +112,6 @@ class ActionServerBase : public Resource {
     const LockGuard lock(mutex_);
     return read_place(oldest(GoalState::unknown), copy, time_ns, reader);
   }
-  /// As WriteService::write() and try_write(). [rt]
-  bool decide(const ActionGoal& decision, time_ns_t time_ns) MAUVE_RT;
-  TryWrite try_decide(const ActionGoal& decision, time_ns_t time_ns) MAUVE_RT;
   /// Feedback about the current goal, or its result: `keep` copies it under mutex_. Without a goal nothing happens, nor in a stop. [rt]
   template <typename Keep>
   bool give_feedback(Keep keep, time_ns_t time_ns) MAUVE_RT {
@@ -154,7 +148,43 @@ class ActionServerBase : public Resource {
     time_ns_t since_ns{0};               // when it came, or became the current one
   };
 
-  std::size_t oldest(GoalState state) const noexcept;
+  /// The services that are the same for all actions, of one port each: one component serves.
+  class Status final : public ReadService<ActionGoal> {
+   public:
+    explicit Status(ActionServerBase& owner) : ReadService<ActionGoal>("status"), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return 1; }
+    DataStatus read(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
+      return owner_.read_status(value, time_ns, reader);
+    }
+
+   private:
+    ActionServerBase& owner_;
+  };
+  class Decide final : public WriteService<ActionGoal> {
+   public:
+    explicit Decide(ActionServerBase& owner) : WriteService<ActionGoal>("decide"), owner_(owner) {}
+    std::uint32_t max_ports() const noexcept override { return 1; }
+    bool write(const ActionGoal& decision, time_ns_t time_ns) noexcept override {
+      return owner_.take_decision(decision, time_ns);
+    }
+    TryWrite try_write(const ActionGoal& decision, time_ns_t time_ns) noexcept override {
+      return owner_.try_decision(decision, time_ns);
+    }
+    void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
+    void forget_floor() noexcept override { owner_.floor().forget(); }
+
+   private:
+    ActionServerBase& owner_;
+  };
+
+  /// Whether a port decides about goals, and whether one looks at those that wait for an answer. [rt]
+  bool is_served() const MAUVE_RT { return decide.ports() != 0; }
+  bool has_judge() const MAUVE_RT { return asked_->ports() != 0; }
+  DataStatus read_status(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
+  bool take_decision(const ActionGoal& decision, time_ns_t time_ns) MAUVE_RT;
+  TryWrite try_decision(const ActionGoal& decision, time_ns_t time_ns) MAUVE_RT;
+
+  std::size_t oldest(GoalState state) const MAUVE_RT;
   std::size_t find(const GoalId& id) const noexcept;
   std::size_t find(std::uint32_t number) const noexcept;
   std::size_t open_goals() const noexcept;
@@ -183,11 +213,17 @@ class ActionServerBase : public Resource {
   std::uint64_t sequence_{1};
   time_ns_t changed_ns_{0};
   ActionCounts counts_;
+  const ServiceBase* asked_{nullptr};  // [setup]
+
+ public:
+  Status status{*this};
+  Decide decide{*this};
 };
 
+/// [rt] Under mutex_.
 template <typename Copy>
-DataStatus ActionServerBase::read_place(std::size_t place, Copy copy, time_ns_t& time_ns,
-                                        ReaderState& reader) noexcept {
+DataStatus ActionServerBase::read_place(std::size_t place, Copy copy, time_ns_t& time_ns, ReaderState& reader)
+    MAUVE_RT {
   if (place == kNone) return DataStatus::none;
   copy(place);
   time_ns = places_[place].since_ns;
@@ -206,18 +242,11 @@ class ActionServer final : public ActionServerBase {
       : ActionServerBase(std::string(ActionTraits<A>::name), goals, answer_ns),
         goals_(places()),
         results_(places()) {
-    for (ServiceBase* const service :
-         std::initializer_list<ServiceBase*>{&status, &goal, &asked, &decide, &feedback, &result})
-      offer(*service);
+    offer_all(goal, asked, feedback, result);
   }
 
  protected:
-  bool is_served() const noexcept override { return decide.ports() != 0; }
-  bool has_judge() const noexcept override { return asked.ports() != 0; }
-  bool take_in(std::span<const std::byte> request, GoalId& id) override {
-    CdrReader reader(request);
-    return reader.get(id) && reader.get(*taken_in_);
-  }
+  bool take_in(std::span<const std::byte> message) override { return CdrReader(message).get(*taken_in_); }
   void keep_goal(std::size_t place) noexcept override {
     goals_[place] = *taken_in_;
     results_[place] = {};
@@ -225,16 +254,10 @@ class ActionServer final : public ActionServerBase {
   void keep_result(std::size_t place) noexcept override { results_[place] = std::exchange(result_, {}); }
   void copy_feedback() noexcept override { *feedback_out_ = feedback_; }
   void copy_result(std::size_t place) noexcept override { *result_out_ = results_[place]; }
-  void put_feedback(const GoalId& id, std::vector<std::byte>& message) const override {
-    CdrWriter writer(message);
-    writer.put(id);
-    writer.put(*feedback_out_);
+  void put_feedback(std::vector<std::byte>& message) const override {
+    CdrWriter(message).put(*feedback_out_);
   }
-  void put_result(GoalState state, std::vector<std::byte>& message) const override {
-    CdrWriter writer(message);
-    writer.put(static_cast<std::int8_t>(state));
-    writer.put(*result_out_);
-  }
+  void put_result(std::vector<std::byte>& message) const override { CdrWriter(message).put(*result_out_); }
 
  private:
   /// Of one port: one component serves.
@@ -251,48 +274,32 @@ class ActionServer final : public ActionServerBase {
     ActionServer& owner_;
   };
   template <Described T, bool (ActionServer::*Put)(const T&, time_ns_t) MAUVE_RT>
-  class Write : public WriteService<T> {
+  class Write final : public WriteService<T> {
    public:
     Write(ActionServer& owner, const char* name) : WriteService<T>(name), owner_(owner) {}
     std::uint32_t max_ports() const noexcept override { return 1; }
     bool write(const T& value, time_ns_t time_ns) noexcept override { return (owner_.*Put)(value, time_ns); }
-    /// Of a stop: `decide` alone says something then.
+    /// Of a stop: `decide` alone acts then.
     TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept override { return TryWrite::done; }
     void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
     void forget_floor() noexcept override { owner_.floor().forget(); }
-
-   protected:
-    ActionServer& owner() const noexcept { return owner_; }
 
    private:
     ActionServer& owner_;
   };
 
-  DataStatus find_status(ActionGoal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
-    return read_status(value, time_ns, reader);
-  }
-  DataStatus find_goal(Goal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+  DataStatus find_goal(Goal& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     return read_goal([&](std::size_t place) noexcept { value = goals_[place]; }, time_ns, reader);
   }
-  DataStatus find_asked(Goal& value, time_ns_t& time_ns, ReaderState& reader) noexcept {
+  DataStatus find_asked(Goal& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     return read_asked([&](std::size_t place) noexcept { value = goals_[place]; }, time_ns, reader);
   }
-  bool take_decision(const ActionGoal& decision, time_ns_t time_ns) noexcept {
-    return ActionServerBase::decide(decision, time_ns);
-  }
-  bool take_feedback(const Feedback& value, time_ns_t time_ns) noexcept {
+  bool take_feedback(const Feedback& value, time_ns_t time_ns) MAUVE_RT {
     return give_feedback([&]() noexcept { feedback_ = value; }, time_ns);
   }
-  bool take_result(const Result& value, time_ns_t time_ns) noexcept {
+  bool take_result(const Result& value, time_ns_t time_ns) MAUVE_RT {
     return give_result([&]() noexcept { result_ = value; }, time_ns);
   }
-  class Decide final : public Write<ActionGoal, &ActionServer::take_decision> {
-   public:
-    using Write<ActionGoal, &ActionServer::take_decision>::Write;
-    TryWrite try_write(const ActionGoal& decision, time_ns_t time_ns) noexcept override {
-      return this->owner().try_decide(decision, time_ns);
-    }
-  };
 
   // Under the base's mutex:
   std::vector<Goal> goals_;      // by place
@@ -305,10 +312,8 @@ class ActionServer final : public ActionServerBase {
   std::unique_ptr<Feedback> feedback_out_{std::make_unique<Feedback>()};
 
  public:
-  Read<ActionGoal, &ActionServer::find_status> status{*this, "status"};
   Read<Goal, &ActionServer::find_goal> goal{*this, "goal"};
   Read<Goal, &ActionServer::find_asked> asked{*this, "asked"};
-  Decide decide{*this, "decide"};
   Write<Feedback, &ActionServer::take_feedback> feedback{*this, "feedback"};
   Write<Result, &ActionServer::take_result> result{*this, "result"};
 };

@@ -51,7 +51,7 @@ struct LatestValueKind {
                             .description = "how many ports may read it",
                             .minimum = 1,
                             .maximum = kMostReaders,
-                            .is_value_count = true,
+                            .values_each = 1,
                             .is_reader_limit = true}},
             .type = TypeNeed::data,
             .values = 3,

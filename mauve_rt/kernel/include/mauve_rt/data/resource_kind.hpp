@@ -24,7 +24,7 @@ struct ResourceParameter {
   std::optional<double> minimum{};
   std::optional<double> maximum{};
   bool is_required{false};
-  bool is_value_count{false};   // so many values more take memory
+  std::size_t values_each{0};   // values that take memory, for each one that it counts
   bool is_reader_limit{false};  // so many ports may connect to the service `read`
   std::string file_key{};       // where architecture files have it, unless under its name
   bool operator==(const ResourceParameter&) const = default;

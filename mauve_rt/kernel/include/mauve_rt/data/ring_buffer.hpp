@@ -397,7 +397,7 @@ struct RingBufferKind {
                         .minimum = 1,
                         .maximum = 1'000'000,
                         .is_required = true,
-                        .is_value_count = true},
+                        .values_each = 1},
                        {.name = "overwrite",
                         .initial = false,
                         .description = "whether a full one drops its oldest element rather than the new one"},
