@@ -195,12 +195,13 @@ class ActionClient final : public ActionClientBase {
   void keep_result() noexcept override { result_ = *result_in_; }
 
  private:
-  template <Described T, DataStatus (ActionClient::*Find)(T&, time_ns_t&, ReaderState&) MAUVE_RT>
+  /// `Part::find` reads it.
+  template <Described T, typename Part>
   class Read final : public ReadService<T> {
    public:
     Read(ActionClient& owner, const char* name) : ReadService<T>(name), owner_(owner) {}
     DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
-      return (owner_.*Find)(value, time_ns, reader);
+      return Part::find(owner_, value, time_ns, reader);
     }
 
    private:
@@ -222,12 +223,18 @@ class ActionClient final : public ActionClientBase {
    private:
     ActionClient& owner_;
   };
-  DataStatus find_feedback(Feedback& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
-    return read_feedback([&]() noexcept { value = feedback_; }, time_ns, reader);
-  }
-  DataStatus find_result(Result& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
-    return read_result([&]() noexcept { value = result_; }, time_ns, reader);
-  }
+  struct FeedbackPart {
+    static DataStatus find(ActionClient& owner, Feedback& value, time_ns_t& time_ns,
+                           ReaderState& reader) MAUVE_RT {
+      return owner.read_feedback([&]() MAUVE_RT { value = owner.feedback_; }, time_ns, reader);
+    }
+  };
+  struct ResultPart {
+    static DataStatus find(ActionClient& owner, Result& value, time_ns_t& time_ns,
+                           ReaderState& reader) MAUVE_RT {
+      return owner.read_result([&]() MAUVE_RT { value = owner.result_; }, time_ns, reader);
+    }
+  };
 
   // Under the base's mutex:
   Goal goal_{};
@@ -240,8 +247,8 @@ class ActionClient final : public ActionClientBase {
 
  public:
   SendGoal goal{*this};
-  Read<Feedback, &ActionClient::find_feedback> feedback{*this, "feedback"};
-  Read<Result, &ActionClient::find_result> result{*this, "result"};
+  Read<Feedback, FeedbackPart> feedback{*this, "feedback"};
+  Read<Result, ResultPart> result{*this, "result"};
 };
 
 /// As architectures name and make it. All functions [setup].

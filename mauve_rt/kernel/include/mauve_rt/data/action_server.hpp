@@ -260,25 +260,26 @@ class ActionServer final : public ActionServerBase {
   void put_result(std::vector<std::byte>& message) const override { CdrWriter(message).put(*result_out_); }
 
  private:
-  /// Of one port: one component serves.
-  template <Described T, DataStatus (ActionServer::*Find)(T&, time_ns_t&, ReaderState&) MAUVE_RT>
+  /// Of one port: one component serves. `Part::find` reads it.
+  template <Described T, typename Part>
   class Read final : public ReadService<T> {
    public:
     Read(ActionServer& owner, const char* name) : ReadService<T>(name), owner_(owner) {}
     std::uint32_t max_ports() const noexcept override { return 1; }
     DataStatus read(T& value, time_ns_t& time_ns, ReaderState& reader) noexcept override {
-      return (owner_.*Find)(value, time_ns, reader);
+      return Part::find(owner_, value, time_ns, reader);
     }
 
    private:
     ActionServer& owner_;
   };
-  template <Described T, bool (ActionServer::*Put)(const T&, time_ns_t) MAUVE_RT>
+  /// `Part::put` writes it.
+  template <Described T, typename Part>
   class Write final : public WriteService<T> {
    public:
     Write(ActionServer& owner, const char* name) : WriteService<T>(name), owner_(owner) {}
     std::uint32_t max_ports() const noexcept override { return 1; }
-    bool write(const T& value, time_ns_t time_ns) noexcept override { return (owner_.*Put)(value, time_ns); }
+    bool write(const T& value, time_ns_t time_ns) noexcept override { return Part::put(owner_, value, time_ns); }
     /// Of a stop: `decide` alone acts then.
     TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept override { return TryWrite::done; }
     void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
@@ -288,18 +289,30 @@ class ActionServer final : public ActionServerBase {
     ActionServer& owner_;
   };
 
-  DataStatus find_goal(Goal& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
-    return read_goal([&](std::size_t place) noexcept { value = goals_[place]; }, time_ns, reader);
-  }
-  DataStatus find_asked(Goal& value, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
-    return read_asked([&](std::size_t place) noexcept { value = goals_[place]; }, time_ns, reader);
-  }
-  bool take_feedback(const Feedback& value, time_ns_t time_ns) MAUVE_RT {
-    return give_feedback([&]() noexcept { feedback_ = value; }, time_ns);
-  }
-  bool take_result(const Result& value, time_ns_t time_ns) MAUVE_RT {
-    return give_result([&]() noexcept { result_ = value; }, time_ns);
-  }
+  struct GoalPart {
+    static DataStatus find(ActionServer& owner, Goal& value, time_ns_t& time_ns,
+                           ReaderState& reader) MAUVE_RT {
+      const auto copy = [&](std::size_t place) MAUVE_RT { value = owner.goals_[place]; };
+      return owner.read_goal(copy, time_ns, reader);
+    }
+  };
+  struct AskedPart {
+    static DataStatus find(ActionServer& owner, Goal& value, time_ns_t& time_ns,
+                           ReaderState& reader) MAUVE_RT {
+      const auto copy = [&](std::size_t place) MAUVE_RT { value = owner.goals_[place]; };
+      return owner.read_asked(copy, time_ns, reader);
+    }
+  };
+  struct FeedbackPart {
+    static bool put(ActionServer& owner, const Feedback& value, time_ns_t time_ns) MAUVE_RT {
+      return owner.give_feedback([&]() MAUVE_RT { owner.feedback_ = value; }, time_ns);
+    }
+  };
+  struct ResultPart {
+    static bool put(ActionServer& owner, const Result& value, time_ns_t time_ns) MAUVE_RT {
+      return owner.give_result([&]() MAUVE_RT { owner.result_ = value; }, time_ns);
+    }
+  };
 
   // Under the base's mutex:
   std::vector<Goal> goals_;      // by place
@@ -312,10 +325,10 @@ class ActionServer final : public ActionServerBase {
   std::unique_ptr<Feedback> feedback_out_{std::make_unique<Feedback>()};
 
  public:
-  Read<Goal, &ActionServer::find_goal> goal{*this, "goal"};
-  Read<Goal, &ActionServer::find_asked> asked{*this, "asked"};
-  Write<Feedback, &ActionServer::take_feedback> feedback{*this, "feedback"};
-  Write<Result, &ActionServer::take_result> result{*this, "result"};
+  Read<Goal, GoalPart> goal{*this, "goal"};
+  Read<Goal, AskedPart> asked{*this, "asked"};
+  Write<Feedback, FeedbackPart> feedback{*this, "feedback"};
+  Write<Result, ResultPart> result{*this, "result"};
 };
 
 /// As architectures name and make it. All functions [setup].
