@@ -49,7 +49,7 @@ from mauve_rt.parts.declarations import (
     write_port,
 )
 from mauve_rt.parts.fsms import Fsm, PeriodicFsm, State, times
-from mauve_rt.parts.goals import GoalNews, GoalSender
+from mauve_rt.parts.goals import GoalEvent, GoalSender
 from mauve_rt.parts.model_core import ModelCore
 from mauve_rt.parts.ports import CallPort, EventPort, Property, ReadPort, RequestPort, Sample, WritePort
 from mauve_rt.parts.resources import (
@@ -90,7 +90,7 @@ __all__ = [
     "EventPort",
     "ExecutionTimeDescription",
     "Fsm",
-    "GoalNews",
+    "GoalEvent",
     "GoalReason",
     "GoalSender",
     "GoalState",

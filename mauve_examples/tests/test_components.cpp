@@ -207,18 +207,18 @@ class Operator {
 
  private:
   void take_news() {
-    mauve::GoalNews news;
+    mauve::GoalEvent event;
     std::vector<std::byte> message;
-    while (robot.drive_to().next_news(news, message)) {
+    while (robot.drive_to().next_event(event, message)) {
       mauve::CdrReader reader(message);
       mauve::GoalId id{};
       std::int8_t final_state = 0;
-      if (news.has_feedback) {
+      if (event.has_feedback) {
         EXPECT_TRUE(reader.get(id) && reader.get(feedback.emplace_back()));
       } else {
-        state = news.state;
+        state = event.state;
       }
-      if (news.has_result) {
+      if (event.has_result) {
         EXPECT_TRUE(reader.get(final_state) && reader.get(result));
       }
     }

@@ -41,19 +41,19 @@ bool PyHost::cancel_goal(const std::string& name, std::uint64_t goal) {
   return server_of(*resource).cancel(id_of_goal(goal), host().now_ns());
 }
 
-std::optional<PyGoalNews> PyHost::next_news(const std::string& name) {
-  GoalNews news;
+std::optional<PyGoalEvent> PyHost::next_event(const std::string& name) {
+  GoalEvent event;
   std::vector<std::byte> message;
   {
     const InterpreterUnlocked release;
     const auto resource = architecture_.hold_resource(name);
     ActionServerBase& server = server_of(*resource);
-    server.look(host().now_ns());
-    if (!server.next_news(news, message)) return std::nullopt;
+    server.poll(host().now_ns());
+    if (!server.next_event(event, message)) return std::nullopt;
   }
-  PyGoalNews made{.goal = goal_of_id(news.id), .state = news.state, .reason = news.reason};
-  if (news.has_feedback) made.feedback = to_bytes(message);
-  if (news.has_result) made.result = to_bytes(message);
+  PyGoalEvent made{.goal = goal_of_id(event.id), .state = event.state, .reason = event.reason};
+  if (event.has_feedback) made.feedback = to_bytes(message);
+  if (event.has_result) made.result = to_bytes(message);
   return made;
 }
 
@@ -77,12 +77,12 @@ void bind_goals(py::module_& module) {
       .value("MALFORMED", GoalReason::malformed)
       .def_property_readonly(
           "text", [](GoalReason self) { return std::string(to_string(self)); }, "The reason in words.");
-  py::class_<PyGoalNews>(module, "GoalNewsData", "Another state of a goal, or feedback about the goal.")
-      .def_readonly("goal", &PyGoalNews::goal, "As ask_goal() returned it.")
-      .def_readonly("state", &PyGoalNews::state)
-      .def_readonly("reason", &PyGoalNews::reason)
-      .def_readonly("feedback", &PyGoalNews::feedback, "The serialized message; None of another state.")
-      .def_readonly("result", &PyGoalNews::result,
+  py::class_<PyGoalEvent>(module, "GoalEventData", "Another state of a goal, or feedback about the goal.")
+      .def_readonly("goal", &PyGoalEvent::goal, "As ask_goal() returned it.")
+      .def_readonly("state", &PyGoalEvent::state)
+      .def_readonly("reason", &PyGoalEvent::reason)
+      .def_readonly("feedback", &PyGoalEvent::feedback, "The serialized message; None of another state.")
+      .def_readonly("result", &PyGoalEvent::result,
                     "The serialized message; None of a goal that has not ended.");
 }
 

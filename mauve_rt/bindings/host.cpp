@@ -476,10 +476,10 @@ False: it has another revision, or a change is open. Unless collect_trace() asks
            R"(Asks an action_server for a goal, a serialized message, as a client of the action does.
 
 (number of the goal, why it is rejected at once - NONE: it waits for its answer). One thread at a time asks,
-cancels and takes news, and only where no ROS action is bound to the resource.)")
+cancels and takes events, and only where no ROS action is bound to the resource.)")
       .def("cancel_goal", &PyHost::cancel_goal, py::arg("resource"), py::arg("goal"), Unlocked(),
            "Asks to cancel a goal; False: no such goal is accepted and has not ended.")
-      .def("next_news", &PyHost::next_news, py::arg("resource"),
+      .def("next_event", &PyHost::next_event, py::arg("resource"),
            "What is to be reported of a goal next, of the oldest goal first; None: nothing.")
       .def("wait_change", &PyHost::wait_change, py::arg("timeout_ns"), Unlocked(),
            "Waits until any component changes its state or core (a fault included); False at the timeout.")

@@ -11,8 +11,8 @@
 
 namespace mauve::bindings {
 
-/// As GoalNews.
-struct PyGoalNews {
+/// As GoalEvent.
+struct PyGoalEvent {
   std::uint64_t goal;  // as ask_goal() returned it
   GoalState state;
   GoalReason reason;
@@ -45,7 +45,7 @@ class PyHost {
   /// As a client of the action does, without ROS: one thread at a time.
   std::pair<std::uint64_t, GoalReason> ask_goal(const std::string& name, const py::bytes& data);
   bool cancel_goal(const std::string& name, std::uint64_t goal);
-  std::optional<PyGoalNews> next_news(const std::string& name);
+  std::optional<PyGoalEvent> next_event(const std::string& name);
   std::vector<std::string> trace_components() const { return host().trace_components(); }
   /// In virtual time whoever drives it drains in time, without a thread.
   void collect_trace(time_ns_t period_ns);

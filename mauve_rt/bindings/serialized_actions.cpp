@@ -91,8 +91,8 @@ class SerializedServer final : public ActionServerBase {
       : ActionServerBase(options.type, get<std::int64_t>(options.parameters, "goals"),
                          get<std::int64_t>(options.parameters, "answer_ns")),
         messages_(options),
-        goals_(messages_.rooms(places())),
-        results_(messages_.rooms(places())) {
+        goals_(messages_.rooms(slots())),
+        results_(messages_.rooms(slots())) {
     begin_result();
     offer_all(goal_service_, asked_service_, feedback_service_, result_service_);
   }
@@ -106,27 +106,27 @@ class SerializedServer final : public ActionServerBase {
     copy_message(message, taken_in_);
     return true;
   }
-  void keep_goal(std::size_t place) noexcept override {
-    copy_message(taken_in_, goals_[place]);
-    copy_message(messages_.zero_result(), results_[place]);
+  void keep_goal(std::size_t slot) noexcept override {
+    copy_message(taken_in_, goals_[slot]);
+    copy_message(messages_.zero_result(), results_[slot]);
   }
-  void keep_result(std::size_t place) noexcept override {
-    std::swap(result_, results_[place]);
+  void keep_result(std::size_t slot) noexcept override {
+    std::swap(result_, results_[slot]);
     begin_result();
   }
   void copy_feedback() noexcept override { copy_message(feedback_, feedback_out_); }
-  void copy_result(std::size_t place) noexcept override { copy_message(results_[place], result_out_); }
+  void copy_result(std::size_t slot) noexcept override { copy_message(results_[slot], result_out_); }
   void put_feedback(std::vector<std::byte>& message) const override { message = feedback_out_; }
   void put_result(std::vector<std::byte>& message) const override { message = result_out_; }
 
  private:
   void begin_result() MAUVE_RT { copy_message(messages_.zero_result(), result_); }
   DataStatus find_goal(Message& message, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
-    return read_goal([&](std::size_t place) noexcept { copy_message(goals_[place], message); }, time_ns,
+    return read_goal([&](std::size_t slot) noexcept { copy_message(goals_[slot], message); }, time_ns,
                      reader);
   }
   DataStatus find_asked(Message& message, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
-    return read_asked([&](std::size_t place) noexcept { copy_message(goals_[place], message); }, time_ns,
+    return read_asked([&](std::size_t slot) noexcept { copy_message(goals_[slot], message); }, time_ns,
                       reader);
   }
   bool take_feedback(std::span<const std::byte> message, time_ns_t time_ns) MAUVE_RT {
@@ -138,7 +138,7 @@ class SerializedServer final : public ActionServerBase {
 
   const ActionMessages messages_;
   // Under the base's mutex:
-  std::vector<Message> goals_;        // by place
+  std::vector<Message> goals_;        // by slot
   std::vector<Message> results_;      // of goals that have ended
   Message result_{messages_.room()};  // of the current one
   Message feedback_{messages_.room()};

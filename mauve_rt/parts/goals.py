@@ -7,7 +7,7 @@ from mauve_rt._kernel import GoalReason, GoalState, Host
 from mauve_rt.parts import messages
 from mauve_rt.parts.action_ports import ActionType
 
-__all__ = ["GoalNews", "GoalSender"]
+__all__ = ["GoalEvent", "GoalSender"]
 
 G = TypeVar("G")
 R = TypeVar("R")
@@ -15,7 +15,7 @@ F = TypeVar("F")
 
 
 @dataclass(frozen=True)
-class GoalNews(Generic[R, F]):
+class GoalEvent(Generic[R, F]):
     """Another state of a goal, or feedback about the goal."""
 
     goal: int  # as GoalSender.ask() returned it
@@ -31,7 +31,7 @@ class GoalSender(Generic[G, R, F]):
         drive = GoalSender(host, "drive", DriveTo)
         goal = drive.ask(DriveTo.Goal())
         simulation.run_until(...)
-        assert drive.news()[-1].state == GoalState.SUCCEEDED
+        assert drive.events()[-1].state == GoalState.SUCCEEDED
 
     In virtual time, or on threads where no ROS action is bound to the resource.
     """
@@ -44,10 +44,10 @@ class GoalSender(Generic[G, R, F]):
         """
         messages.action_name(action)
         self._host, self._resource, self._action = host, resource, action
-        self._rejected: list[GoalNews[R, F]] = []
+        self._rejected: list[GoalEvent[R, F]] = []
 
     def ask(self, goal: G) -> int:
-        """Ask for a goal; its number, for `news` and `cancel`.
+        """Ask for a goal; its number, for `events` and `cancel`.
 
         Raises:
             TypeError: a goal of another type.
@@ -58,22 +58,22 @@ class GoalSender(Generic[G, R, F]):
             raise TypeError(f"resource '{self._resource}': expected {expected}, found {goal!r}")
         number, reason = self._host.ask_goal(self._resource, messages.serialize(goal))
         if reason != GoalReason.NONE:
-            self._rejected.append(GoalNews(number, GoalState.REJECTED, reason))
+            self._rejected.append(GoalEvent(number, GoalState.REJECTED, reason))
         return number
 
     def cancel(self, goal: int) -> bool:
         """Ask to cancel a goal; False: the goal is not accepted, or has ended."""
         return self._host.cancel_goal(self._resource, goal)
 
-    def news(self) -> list[GoalNews[R, F]]:
+    def events(self) -> list[GoalEvent[R, F]]:
         """What became of the goals since the last call; states in between may be missing."""
         found, self._rejected = self._rejected, []
-        while (data := self._host.next_news(self._resource)) is not None:
+        while (data := self._host.next_event(self._resource)) is not None:
             feedback, result = (
                 _read(data.feedback, self._action.Feedback),
                 _read(data.result, self._action.Result),
             )
-            found.append(GoalNews(data.goal, data.state, data.reason, feedback, result))
+            found.append(GoalEvent(data.goal, data.state, data.reason, feedback, result))
         return found
 
 

@@ -20,11 +20,12 @@ namespace mauve::bridge {
 
 namespace {
 
-constexpr int kActionRequestsAtOnce = 64;       // of one kind before the others have their turn
-constexpr std::size_t kGoalRequests = 100;      // that the middleware keeps until they are taken
-constexpr std::size_t kResultRequests = 64;     // that wait for the result of one goal; more get no answer
-constexpr time_ns_t kServerEvery = s_to_ns(1);  // so often it is looked whether the server is still there
-constexpr time_ns_t kServerGone = s_to_ns(3);   // so long it may be unseen: discovery has gaps
+constexpr int kActionRequestsAtOnce = 64;    // of one kind before the others have their turn
+constexpr std::size_t kGoalRequests = 100;   // that the middleware keeps until they are taken
+constexpr std::size_t kResultRequests = 64;  // that wait for the result of one goal; more get no answer
+constexpr time_ns_t kServerEvery =
+    s_to_ns(1);                                // so often the bridge checks whether the server is still there
+constexpr time_ns_t kServerGone = s_to_ns(3);  // so long it may be unseen: discovery has gaps
 
 // How the C structs of all types begin that rosidl makes for an action.
 struct IdFirst {  // SendGoal_Request, GetResult_Request, FeedbackMessage
@@ -170,7 +171,7 @@ std::vector<Arrival*> OfferedAction::arrivals(Lane lane) {
   return lane == Lane::requests ? std::vector<Arrival*>{this} : std::vector<Arrival*>{};
 }
 
-time_ns_t OfferedAction::next_look_ns() const { return server_->look(monotonic_now_ns()); }
+time_ns_t OfferedAction::next_look_ns() const { return server_->poll(monotonic_now_ns()); }
 
 void OfferedAction::join(rcl_wait_set_t& set) {
   went_well(rcl_action_wait_set_add_action_server(&set, entity_.get(), nullptr));
@@ -272,20 +273,20 @@ void OfferedAction::forget_expired() {
 }
 
 bool OfferedAction::send() {
-  GoalNews news;
-  if (!server_->next_news(news, message_)) return false;
+  GoalEvent event;
+  if (!server_->next_event(event, message_)) return false;
   const LockGuard lock(mutex_);
-  const auto found = goals_.find(news.id);
+  const auto found = goals_.find(event.id);
   if (found == goals_.end()) return true;
-  if (news.has_feedback) {
-    insert_id(news.id, message_);
+  if (event.has_feedback) {
+    insert_id(event.id, message_);
     if (feedback_.deserialize(message_))
       went_well(rcl_action_publish_feedback(entity_.get(), feedback_.get()));
-  } else if (news.state == GoalState::rejected || !accept(news.id, found->second)) {
+  } else if (event.state == GoalState::rejected || !accept(event.id, found->second)) {
     answer(found->second.asked, false);
     goals_.erase(found);
   } else {
-    follow(news, found->second);
+    follow(event, found->second);
     publish_status();
   }
   return true;
@@ -304,23 +305,23 @@ bool OfferedAction::accept(const GoalId& id, Goal& goal) {
   return true;
 }
 
-/// By the events that lead there: who looks late has missed states.
-void OfferedAction::follow(const GoalNews& news, Goal& goal) {
+/// By the events of rcl that lead there: states in between may be missing.
+void OfferedAction::follow(const GoalEvent& event, Goal& goal) {
   const auto update = [&](rcl_action_goal_event_t event) {
     went_well(rcl_action_update_goal_state(goal.handle, event));
   };
   rcl_action_goal_state_t state = GOAL_STATE_UNKNOWN;
   if (!went_well(rcl_action_goal_handle_get_status(goal.handle, &state))) return;
-  const bool is_to_cancel = news.state == GoalState::canceling || news.state == GoalState::canceled;
+  const bool is_to_cancel = event.state == GoalState::canceling || event.state == GoalState::canceled;
   if (is_to_cancel && state != GOAL_STATE_CANCELING) update(GOAL_EVENT_CANCEL_GOAL);
-  if (!is_to_cancel && news.state != GoalState::accepted && state == GOAL_STATE_ACCEPTED)
+  if (!is_to_cancel && event.state != GoalState::accepted && state == GOAL_STATE_ACCEPTED)
     update(GOAL_EVENT_EXECUTE);
-  if (news.state == GoalState::succeeded) update(GOAL_EVENT_SUCCEED);
-  if (news.state == GoalState::aborted) update(GOAL_EVENT_ABORT);
-  if (news.state == GoalState::canceled) update(GOAL_EVENT_CANCELED);
-  if (!news.has_result) return;
+  if (event.state == GoalState::succeeded) update(GOAL_EVENT_SUCCEED);
+  if (event.state == GoalState::aborted) update(GOAL_EVENT_ABORT);
+  if (event.state == GoalState::canceled) update(GOAL_EVENT_CANCELED);
+  if (!event.has_result) return;
   went_well(rcl_action_notify_goal_done(entity_.get()));
-  goal.ended = news.state;
+  goal.ended = event.state;
   goal.result = message_;
   for (const rmw_request_id_t& asked : std::exchange(goal.results, {}))
     send_result(asked, goal.ended, goal.result);
@@ -392,7 +393,7 @@ bool CalledAction::has_server() const {
 
 time_ns_t CalledAction::next_look_ns() const {
   const time_ns_t now_ns = monotonic_now_ns();
-  const time_ns_t answer_ns = client_->look(now_ns);
+  const time_ns_t answer_ns = client_->poll(now_ns);
   const std::uint32_t number = client_->open_goal();
   if (number == 0 || has_server()) {
     unseen_since_ns_ = kForever;

@@ -103,7 +103,7 @@ class OfferedAction final : public Binding, private Arrival {
 
   void answer(const rmw_request_id_t& asked, bool is_accepted) MAUVE_REQUIRES(mutex_);
   bool accept(const GoalId& id, Goal& goal) MAUVE_REQUIRES(mutex_);
-  void follow(const GoalNews& news, Goal& goal) MAUVE_REQUIRES(mutex_);
+  void follow(const GoalEvent& event, Goal& goal) MAUVE_REQUIRES(mutex_);
   void send_result(const rmw_request_id_t& asked, GoalState ended, std::vector<std::byte>& result)
       MAUVE_REQUIRES(mutex_);
   void publish_status() MAUVE_REQUIRES(mutex_);

@@ -73,7 +73,7 @@ void ActionClientBase::enter(GoalState state, GoalReason reason, time_ns_t now_n
 
 void ActionClientBase::cancel_locked(time_ns_t time_ns) noexcept {
   if (!floor_.admits(time_ns) || !is_open()) return;
-  if (is_to_send_) {  // nobody has it yet
+  if (is_to_send_) {  // it is not sent yet
     is_to_send_ = false;
     enter(GoalState::canceled, GoalReason::none, time_ns);
     return;
@@ -81,7 +81,7 @@ void ActionClientBase::cancel_locked(time_ns_t time_ns) noexcept {
   is_to_cancel_ = true;
 }
 
-// ---- who carries goals
+// ---- the carrier
 
 bool ActionClientBase::next_goal(std::vector<std::byte>& message, std::uint32_t& number) {
   {
@@ -160,7 +160,7 @@ void ActionClientBase::give_up(std::uint32_t number, GoalReason reason, time_ns_
   written(now_ns);
 }
 
-time_ns_t ActionClientBase::look(time_ns_t now_ns) {
+time_ns_t ActionClientBase::poll(time_ns_t now_ns) {
   {
     const LockGuard lock(mutex_);
     if (!is_open() || state_ != GoalState::unknown) return kForever;

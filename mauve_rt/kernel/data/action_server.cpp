@@ -10,9 +10,9 @@ namespace mauve {
 
 namespace {
 
-constexpr time_ns_t kServedEvery = ms_to_ns(100);  // so often it is looked whether a component still serves
-constexpr std::size_t kEndedGoals = 2;  // places for goals that have ended, and are not reported yet
-constexpr std::size_t kPlacesPerGoal = 2;
+constexpr time_ns_t kServedEvery = ms_to_ns(100);  // so often it is checked whether a component still serves
+constexpr std::size_t kEndedGoals = 2;  // slots for goals that have ended, and are not reported yet
+constexpr std::size_t kSlotsPerGoal = 2;
 constexpr std::size_t kValuesPerPlace = 2;  // a goal and its result
 constexpr std::size_t kValuesBesides =
     5;  // the result and the feedback that are written, and what goes in and out
@@ -56,7 +56,7 @@ std::string_view to_string(GoalReason reason) noexcept {
     case GoalReason::full:
       return "there are as many goals as allowed";
     case GoalReason::no_server:
-      return "nobody serves the action";
+      return "no server of the action is there";
     case GoalReason::malformed:
       return "the message does not fit the type";
   }
@@ -67,7 +67,7 @@ ActionServerBase::ActionServerBase(std::string type, std::int64_t goals, time_ns
     : Resource("action_server", std::move(type)),
       goals_(static_cast<std::size_t>(goals)),
       answer_ns_(answer_ns),
-      places_(kPlacesPerGoal * goals_ + kEndedGoals) {
+      slots_(kSlotsPerGoal * goals_ + kEndedGoals) {
   MAUVE_EXPECTS(goals >= 1 && goals <= kMostGoals && answer_ns >= 1);  // checked with the kind's parameters
 }
 
@@ -89,39 +89,37 @@ ActionCounts ActionServerBase::counts() const {
   return counts_;
 }
 
-// ---- places, under mutex_
+// ---- slots, under mutex_
 
 std::size_t ActionServerBase::oldest(GoalState state) const noexcept {
   std::size_t found = kNone;
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    const Place& place = places_[i];
-    if (place.is_used && place.state == state && (found == kNone || place.number < places_[found].number))
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    const Slot& slot = slots_[i];
+    if (slot.is_used && slot.state == state && (found == kNone || slot.number < slots_[found].number))
       found = i;
   }
   return found;
 }
 
 std::size_t ActionServerBase::find(const GoalId& id) const noexcept {
-  const auto found = std::find_if(places_.begin(), places_.end(),
-                                  [&](const Place& place) { return place.is_used && place.id == id; });
-  return found == places_.end() ? kNone : static_cast<std::size_t>(found - places_.begin());
+  const auto found = std::find_if(slots_.begin(), slots_.end(),
+                                  [&](const Slot& slot) { return slot.is_used && slot.id == id; });
+  return found == slots_.end() ? kNone : static_cast<std::size_t>(found - slots_.begin());
 }
 
 std::size_t ActionServerBase::find(std::uint32_t number) const noexcept {
-  const auto found = std::find_if(places_.begin(), places_.end(), [&](const Place& place) {
-    return place.is_used && place.number == number;
-  });
-  return found == places_.end() ? kNone : static_cast<std::size_t>(found - places_.begin());
+  const auto found = std::find_if(slots_.begin(), slots_.end(),
+                                  [&](const Slot& slot) { return slot.is_used && slot.number == number; });
+  return found == slots_.end() ? kNone : static_cast<std::size_t>(found - slots_.begin());
 }
 
 std::size_t ActionServerBase::open_goals() const noexcept {
-  return static_cast<std::size_t>(std::count_if(places_.begin(), places_.end(), [](const Place& place) {
-    return place.is_used && !is_final(place.state);
-  }));
+  return static_cast<std::size_t>(std::count_if(
+      slots_.begin(), slots_.end(), [](const Slot& slot) { return slot.is_used && !is_final(slot.state); }));
 }
 
-void ActionServerBase::accept(std::size_t place, time_ns_t now_ns) noexcept {
-  places_[place].state = GoalState::accepted;
+void ActionServerBase::accept(std::size_t slot, time_ns_t now_ns) noexcept {
+  slots_[slot].state = GoalState::accepted;
   ++counts_.accepted;
   changed(now_ns);
   if (current_ == kNone) begin_next(now_ns);
@@ -130,12 +128,12 @@ void ActionServerBase::accept(std::size_t place, time_ns_t now_ns) noexcept {
 void ActionServerBase::begin_next(time_ns_t now_ns) noexcept {
   current_ = oldest(GoalState::accepted);
   if (current_ == kNone) return;
-  places_[current_].state = GoalState::executing;
-  places_[current_].since_ns = now_ns;
+  slots_[current_].state = GoalState::executing;
+  slots_[current_].since_ns = now_ns;
 }
 
-void ActionServerBase::end(std::size_t place, GoalState state, GoalReason reason, time_ns_t now_ns) noexcept {
-  Place& goal = places_[place];
+void ActionServerBase::end(std::size_t slot, GoalState state, GoalReason reason, time_ns_t now_ns) noexcept {
+  Slot& goal = slots_[slot];
   goal.state = state;
   goal.reason = reason;
   std::uint64_t& count = state == GoalState::succeeded  ? counts_.succeeded
@@ -146,17 +144,17 @@ void ActionServerBase::end(std::size_t place, GoalState state, GoalReason reason
   changed(now_ns);
   if (reason != GoalReason::none)
     log().warn("goal {} is {}: {}", goal.number, to_string(state), to_string(reason));
-  if (place != current_) return;
-  keep_result(place);
+  if (slot != current_) return;
+  keep_result(slot);
   has_feedback_ = false;
   current_ = kNone;
 }
 
 void ActionServerBase::end_all(GoalReason reason, time_ns_t now_ns) noexcept {
-  for (std::size_t i = 0; i < places_.size(); ++i) {
-    const Place& place = places_[i];
-    if (!place.is_used || is_final(place.state)) continue;
-    end(i, place.state == GoalState::unknown ? GoalState::rejected : GoalState::aborted, reason, now_ns);
+  for (std::size_t i = 0; i < slots_.size(); ++i) {
+    const Slot& slot = slots_[i];
+    if (!slot.is_used || is_final(slot.state)) continue;
+    end(i, slot.state == GoalState::unknown ? GoalState::rejected : GoalState::aborted, reason, now_ns);
   }
 }
 
@@ -165,18 +163,18 @@ void ActionServerBase::changed(time_ns_t now_ns) noexcept {
   changed_ns_ = now_ns;
 }
 
-// ---- who carries goals
+// ---- the carrier
 
 GoalReason ActionServerBase::ask(const GoalId& id, std::span<const std::byte> message, time_ns_t now_ns) {
   if (!take_in(message)) return GoalReason::malformed;
   {
     const LockGuard lock(mutex_);
     const auto room =
-        std::find_if(places_.begin(), places_.end(), [](const Place& place) { return !place.is_used; });
+        std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return !slot.is_used; });
     GoalReason refused = GoalReason::none;
     if (!is_served()) {
       refused = GoalReason::no_server;
-    } else if (open_goals() >= goals_ || room == places_.end() || find(id) != kNone) {
+    } else if (open_goals() >= goals_ || room == slots_.end() || find(id) != kNone) {
       refused = GoalReason::full;
     }
     if (refused != GoalReason::none) {
@@ -188,7 +186,7 @@ GoalReason ActionServerBase::ask(const GoalId& id, std::span<const std::byte> me
              .number = next_number_++,
              .due_ns = now_ns + answer_ns_,
              .since_ns = now_ns};
-    keep_goal(static_cast<std::size_t>(room - places_.begin()));
+    keep_goal(static_cast<std::size_t>(room - slots_.begin()));
     changed(now_ns);
   }
   written(now_ns);
@@ -198,54 +196,54 @@ GoalReason ActionServerBase::ask(const GoalId& id, std::span<const std::byte> me
 bool ActionServerBase::cancel(const GoalId& id, time_ns_t now_ns) {
   {
     const LockGuard lock(mutex_);
-    const std::size_t place = find(id);
-    if (place == kNone || places_[place].state == GoalState::unknown || is_final(places_[place].state))
+    const std::size_t slot = find(id);
+    if (slot == kNone || slots_[slot].state == GoalState::unknown || is_final(slots_[slot].state))
       return false;
-    if (place == current_) {
-      places_[place].state = GoalState::canceling;
+    if (slot == current_) {
+      slots_[slot].state = GoalState::canceling;
       changed(now_ns);
     } else {
-      end(place, GoalState::canceled, GoalReason::none, now_ns);
+      end(slot, GoalState::canceled, GoalReason::none, now_ns);
     }
   }
   written(now_ns);
   return true;
 }
 
-bool ActionServerBase::next_news(GoalNews& news, std::vector<std::byte>& message) {
+bool ActionServerBase::next_event(GoalEvent& event, std::vector<std::byte>& message) {
   {
     const LockGuard lock(mutex_);
     std::size_t found = kNone;
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      const Place& place = places_[i];
-      const bool is_news = place.is_used && (place.state != place.told || (i == current_ && has_feedback_));
-      if (is_news && (found == kNone || place.number < places_[found].number)) found = i;
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      const Slot& slot = slots_[i];
+      const bool is_event = slot.is_used && (slot.state != slot.reported || (i == current_ && has_feedback_));
+      if (is_event && (found == kNone || slot.number < slots_[found].number)) found = i;
     }
     if (found == kNone) return false;
-    Place& place = places_[found];
-    const bool is_other = place.state != place.told;
-    news = {.id = place.id,
-            .number = place.number,
-            .state = place.state,
-            .reason = place.reason,
-            .has_feedback = !is_other,
-            .has_result = is_other && is_final(place.state)};
-    place.told = place.state;
-    if (news.has_feedback) {
+    Slot& slot = slots_[found];
+    const bool is_other = slot.state != slot.reported;
+    event = {.id = slot.id,
+             .number = slot.number,
+             .state = slot.state,
+             .reason = slot.reason,
+             .has_feedback = !is_other,
+             .has_result = is_other && is_final(slot.state)};
+    slot.reported = slot.state;
+    if (event.has_feedback) {
       has_feedback_ = false;
       copy_feedback();
     }
-    if (news.has_result) {
+    if (event.has_result) {
       copy_result(found);
-      place.is_used = false;
+      slot.is_used = false;
     }
   }
-  if (news.has_feedback) put_feedback(message);
-  if (news.has_result) put_result(message);
+  if (event.has_feedback) put_feedback(message);
+  if (event.has_result) put_result(message);
   return true;
 }
 
-time_ns_t ActionServerBase::look(time_ns_t now_ns) {
+time_ns_t ActionServerBase::poll(time_ns_t now_ns) {
   time_ns_t next_ns = kForever;
   bool has_ended = false;
   {
@@ -255,14 +253,14 @@ time_ns_t ActionServerBase::look(time_ns_t now_ns) {
       end_all(GoalReason::removed, now_ns);
       has_ended = true;
     }
-    for (std::size_t i = 0; i < places_.size(); ++i) {
-      const Place& place = places_[i];
-      if (!place.is_used || place.state != GoalState::unknown) continue;
-      if (place.due_ns <= now_ns) {
+    for (std::size_t i = 0; i < slots_.size(); ++i) {
+      const Slot& slot = slots_[i];
+      if (!slot.is_used || slot.state != GoalState::unknown) continue;
+      if (slot.due_ns <= now_ns) {
         end(i, GoalState::rejected, GoalReason::no_answer, now_ns);
         has_ended = true;
       } else {
-        next_ns = std::min(next_ns, place.due_ns);
+        next_ns = std::min(next_ns, slot.due_ns);
       }
     }
     if (open_goals() != 0) next_ns = std::min(next_ns, now_ns + kServedEvery);
@@ -289,18 +287,18 @@ DataStatus ActionServerBase::read_status(ActionGoal& value, time_ns_t& time_ns,
     const LockGuard lock(mutex_);
     if (!has_judge()) {
       for (std::size_t next = oldest(GoalState::unknown); next != kNone; next = oldest(GoalState::unknown)) {
-        accept(next, places_[next].since_ns);
+        accept(next, slots_[next].since_ns);
         has_accepted = true;
       }
     }
     const std::size_t asked = oldest(GoalState::unknown);
-    value = {.asked = asked == kNone ? 0 : places_[asked].number};
+    value = {.asked = asked == kNone ? 0 : slots_[asked].number};
     if (current_ != kNone) {
-      value.number = places_[current_].number;
-      value.state = static_cast<std::uint8_t>(places_[current_].state);
+      value.number = slots_[current_].number;
+      value.state = static_cast<std::uint8_t>(slots_[current_].state);
     }
-    for (const Place& place : places_)
-      value.waiting += place.is_used && place.state == GoalState::accepted ? 1U : 0U;
+    for (const Slot& slot : slots_)
+      value.waiting += slot.is_used && slot.state == GoalState::accepted ? 1U : 0U;
     time_ns = changed_ns_;
     found = reader.look(sequence_);
   }
@@ -337,15 +335,15 @@ bool ActionServerBase::decide_locked(const ActionGoal& decision, time_ns_t time_
   }
   const bool is_answer = state == GoalState::accepted || state == GoalState::rejected;
   const std::size_t meant = is_answer ? oldest(GoalState::unknown) : current_;
-  const std::size_t place = decision.number == 0 ? meant : find(decision.number);
-  if (place == kNone || !fits(places_[place].state, state)) {
+  const std::size_t slot = decision.number == 0 ? meant : find(decision.number);
+  if (slot == kNone || !fits(slots_[slot].state, state)) {
     ++counts_.refused;
     return false;
   }
   if (state == GoalState::accepted) {
-    accept(place, time_ns);
+    accept(slot, time_ns);
   } else {
-    end(place, state, GoalReason::none, time_ns);
+    end(slot, state, GoalReason::none, time_ns);
     if (current_ == kNone) begin_next(time_ns);
   }
   return true;
@@ -359,7 +357,7 @@ ResourceKind ActionServerKind::describe() {
                       .description = "so many goals at once, the executed one among them; more are rejected",
                       .minimum = 1,
                       .maximum = static_cast<double>(kMostGoals),
-                      .values_each = kPlacesPerGoal * kValuesPerPlace},
+                      .values_each = kSlotsPerGoal * kValuesPerPlace},
                      {.name = "answer_ns",
                       .initial = kDefaultAnswerTime,
                       .description = "a goal that the component has not answered by then is rejected",

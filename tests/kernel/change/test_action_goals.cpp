@@ -82,8 +82,8 @@ class ActionGoals : public OnBothHosts<Way> {
         "the end of the goal");
   }
   void look() {
-    for (const auto& [goal, news] : carrier->take())
-      states[goal].insert(states[goal].end(), news.begin(), news.end());
+    for (const auto& [goal, event] : carrier->take())
+      states[goal].insert(states[goal].end(), event.begin(), event.end());
   }
 
   ActionServer<Walk>* server{nullptr};
@@ -106,14 +106,14 @@ TYPED_TEST(ActionGoals, AreSentAndFollowedByAProgram) {
   GoalSender<Walk> sender(*this->server, [this] { return (*this->host).now_ns(); });
   const std::uint64_t first = sender.ask({.steps = 1'000'000}), second = sender.ask({.steps = 3});
   const std::uint64_t third = sender.ask({.steps = 1});
-  std::vector<GoalSender<Walk>::News> news = sender.news();
-  ASSERT_FALSE(news.empty());
-  EXPECT_EQ(third, news.front().goal);
-  EXPECT_EQ(GoalReason::full, news.front().reason);
+  std::vector<GoalSender<Walk>::Event> event = sender.events();
+  ASSERT_FALSE(event.empty());
+  EXPECT_EQ(third, event.front().goal);
+  EXPECT_EQ(GoalReason::full, event.front().reason);
   const auto find = [&](std::uint64_t goal, const auto& is_wanted) {
     return [&, goal] {
-      for (const auto& each : sender.news()) news.push_back(each);
-      return std::any_of(news.begin(), news.end(),
+      for (const auto& each : sender.events()) event.push_back(each);
+      return std::any_of(event.begin(), event.end(),
                          [&](const auto& each) { return each.goal == goal && is_wanted(each); });
     };
   };
@@ -179,7 +179,7 @@ TYPED_TEST(ActionGoals, AreAbortedWhenTheCoreThrows) {
   this->carrier->ask(2, 5, (*this->host).now_ns());
   this->look();
   EXPECT_TRUE(this->states.empty() || this->states[1].back() == rejected);
-  this->server->look((*this->host).now_ns() + s_to_ns(200));
+  this->server->poll((*this->host).now_ns() + s_to_ns(200));
   this->until_ended(2);
   EXPECT_EQ(rejected, this->states[2].back());
   EXPECT_EQ(GoalReason::no_answer, this->carrier->reasons[2])

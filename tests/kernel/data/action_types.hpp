@@ -52,22 +52,22 @@ struct GoalCarrier {
   /// All states that were told since the last call, by goal.
   std::map<int, std::vector<GoalState>> take() {
     std::map<int, std::vector<GoalState>> states;
-    GoalNews news;
+    GoalEvent event;
     std::vector<std::byte> message;
-    while (server.next_news(news, message)) {
+    while (server.next_event(event, message)) {
       CdrReader reader(message);
-      if (news.has_feedback) {
+      if (event.has_feedback) {
         Walk::Feedback value;
         EXPECT_TRUE(reader.get(value));
         feedback.push_back(value.step);
         continue;
       }
-      states[news.id[0]].push_back(news.state);
-      reasons[news.id[0]] = news.reason;
-      if (!news.has_result) continue;
+      states[event.id[0]].push_back(event.state);
+      reasons[event.id[0]] = event.reason;
+      if (!event.has_result) continue;
       Walk::Result value;
       EXPECT_TRUE(reader.get(value));
-      results[news.id[0]] = value.steps;
+      results[event.id[0]] = value.steps;
     }
     return states;
   }

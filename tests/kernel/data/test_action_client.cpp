@@ -87,8 +87,8 @@ TEST_F(ActionClients, HasOneGoalAtATime) {
 TEST_F(ActionClients, AGoalThatIsNotAnsweredInTimeIsRejected) {
   goal.write({1});
   const time_ns_t sent_ns = status.read().time_ns;
-  EXPECT_EQ(sent_ns + kAnswer, client.look(sent_ns + 1));
-  client.look(sent_ns + kAnswer);
+  EXPECT_EQ(sent_ns + kAnswer, client.poll(sent_ns + 1));
+  client.poll(sent_ns + kAnswer);
   EXPECT_EQ(rejected, state());
   EXPECT_EQ(GoalReason::no_answer, found().its_reason());
   EXPECT_FALSE(next()) << "nobody gets it any more";

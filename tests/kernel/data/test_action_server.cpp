@@ -87,9 +87,9 @@ TEST_F(ActionServers, RejectsAGoalThatIsNoMessageOfTheType) {
 
 TEST_F(ActionServers, RejectsAGoalThatIsNotAnsweredInTime) {
   EXPECT_EQ(GoalReason::none, carrier.ask(1, 1, ms_to_ns(5)));
-  EXPECT_EQ(ms_to_ns(5) + kAnswer, server.look(ms_to_ns(104)));
+  EXPECT_EQ(ms_to_ns(5) + kAnswer, server.poll(ms_to_ns(104)));
   EXPECT_EQ(States{}, carrier.take());
-  EXPECT_EQ(kForever, server.look(ms_to_ns(105)));
+  EXPECT_EQ(kForever, server.poll(ms_to_ns(105)));
   EXPECT_EQ((States{{1, {rejected}}}), carrier.take());
   EXPECT_EQ(GoalReason::no_answer, carrier.reasons[1]);
   EXPECT_EQ(unknown, state()) << "it is too late to accept it";
@@ -180,7 +180,7 @@ TEST_F(ActionServers, WithoutAComponentGoalsEndAsRemoved) {
   carrier.ask(1, 1);
   EXPECT_EQ(executing, state());
   decide.disconnect();
-  EXPECT_EQ(kForever, server.look(1));
+  EXPECT_EQ(kForever, server.poll(1));
   EXPECT_EQ((States{{1, {aborted}}}), carrier.take());
   EXPECT_EQ(GoalReason::removed, carrier.reasons[1]);
   EXPECT_EQ(GoalReason::no_server, carrier.ask(2, 1));

@@ -15,7 +15,7 @@ from mauve_rt.api import (
     ActionClient,
     ActionServer,
     Core,
-    GoalNews,
+    GoalEvent,
     GoalReason,
     GoalSender,
     GoalState,
@@ -31,7 +31,7 @@ from mauve_rt.model.plugins import PluginLoader
 MS = 1_000_000
 PORTS = ("status", "goal", "decide", "feedback", "result")
 PACKAGES = {"cpp": "executor_tests", "python": "action_tests", "mixed": "action_tests"}
-News = GoalNews[Any, Any]
+Event = GoalEvent[Any, Any]
 
 
 class Served:
@@ -41,16 +41,16 @@ class Served:
         self.running = running
         self.package = package
         self.sender = GoalSender(running.host, "drive", DriveTo)
-        self.news: list[News] = []
+        self.received: list[Event] = []
 
     def ask(self, far: float) -> int:
         goal = DriveTo.Goal()
         goal.pose.pose.position.x = far
         return self.sender.ask(goal)
 
-    def of(self, goal: int) -> list[News]:
-        self.news += self.sender.news()
-        return [each for each in self.news if each.goal == goal]
+    def of(self, goal: int) -> list[Event]:
+        self.received += self.sender.events()
+        return [each for each in self.received if each.goal == goal]
 
     def left(self, goal: int) -> list[float]:
         """How far the component was, by the feedback."""
@@ -59,8 +59,8 @@ class Served:
     def until(self, condition: Callable[[], object]) -> None:
         self.running.run_until(condition)
 
-    def end(self, goal: int) -> News:
-        """The last news of a goal, which ends."""
+    def end(self, goal: int) -> Event:
+        """The last event of a goal, which ends."""
         self.until(lambda: any(each.state.is_final for each in self.of(goal)))
         return self.of(goal)[-1]
 
@@ -197,12 +197,12 @@ def test_a_goal_that_is_too_large_is_refused(way: str) -> None:
         goal = DriveTo.Goal()
         goal.pose.header.frame_id = "x" * 200
         refused = sender.ask(goal)
-        assert sender.news() == [GoalNews(refused, GoalState.REJECTED, GoalReason.MALFORMED)]
+        assert sender.events() == [GoalEvent(refused, GoalState.REJECTED, GoalReason.MALFORMED)]
         BigCore.said = ()
         number, found = sender.ask(DriveTo.Goal()), []
 
         def has_ended() -> bool:
-            found.extend(sender.news())
+            found.extend(sender.events())
             return any(each.goal == number and each.state.is_final for each in found)
 
         running.run_until(has_ended)

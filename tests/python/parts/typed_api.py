@@ -27,7 +27,7 @@ from mauve_rt.api import (
     EventCounter,
     EventPort,
     Fsm,
-    GoalNews,
+    GoalEvent,
     GoalReason,
     GoalSender,
     GoalState,
@@ -205,7 +205,7 @@ class DriveCore(Core[DriveShell]):
 def send(host: Host) -> None:
     sender = GoalSender(host, "drive", Drive)
     assert_type(sender.ask(Drive.Goal()), int)
-    assert_type(sender.news(), list[GoalNews[DriveResult, DriveFeedback]])
+    assert_type(sender.events(), list[GoalEvent[DriveResult, DriveFeedback]])
     sender.ask(Drive.Feedback())  # type: ignore[arg-type]
 
 

@@ -25,7 +25,7 @@ namespace mauve {
 ///
 /// | member              | written by                       | read by          | under  |
 /// | ------------------- | -------------------------------- | ---------------- | ------ |
-/// | status_ ... counts_ | component, who carries goals     | both             | mutex_ |
+/// | status_ ... counts_ | component, carrier               | both             | mutex_ |
 /// | what a derived class keeps | both                      | both             | mutex_ |
 /// | what it takes in, and hands out | receivers' thread; sender's thread | same | -   |
 /// | floor_              | commits, who deploys             | component        | its own |
@@ -39,7 +39,7 @@ class ActionClientBase : public Resource {
   /// [non-rt]
   ActionCounts counts() const;
 
-  // ---- who carries goals: one thread sends, one receives
+  // ---- the carrier of goals (the bridge): one thread sends, one receives
 
   /// The goal to be sent, once each, as rosidl's <Type>_Goal; false: none. [non-rt]
   bool next_goal(std::vector<std::byte>& message, std::uint32_t& number);
@@ -55,17 +55,17 @@ class ActionClientBase : public Resource {
   void give_up(std::uint32_t number, GoalReason reason, time_ns_t now_ns);
   /// The number of the goal that has not ended; 0: there is none. [non-rt]
   std::uint32_t open_goal() const;
-  /// Rejects a goal that was not answered in time; returns when to look again. [non-rt]
-  time_ns_t look(time_ns_t now_ns);
+  /// Rejects a goal that was not answered in time; returns when to call it again. [non-rt]
+  time_ns_t poll(time_ns_t now_ns);
 
  protected:
   /// Offers all services, these of the action's own types among them. [setup]
   void offer_all(ServiceBase& goal, ServiceBase& feedback, ServiceBase& result);
-  /// Copies the goal to a place of its own. [rt] Under mutex_.
+  /// Copies the goal to a buffer. [rt] Under mutex_.
   virtual void copy_goal() MAUVE_RT = 0;
   /// That copy as a message. [non-rt]
   virtual void put_goal(std::vector<std::byte>& message) const = 0;
-  /// Reads a message into a place of its own; false: malformed. [non-rt]
+  /// Reads a message into a buffer; false: malformed. [non-rt]
   virtual bool take_in_feedback(std::span<const std::byte> message) = 0;
   virtual bool take_in_result(std::span<const std::byte> message) = 0;
   /// Keeps what was taken in. [rt] Under mutex_.
@@ -224,14 +224,14 @@ class ActionClient final : public ActionClientBase {
     ActionClient& owner_;
   };
   struct FeedbackPart {
-    static DataStatus find(ActionClient& owner, Feedback& value, time_ns_t& time_ns,
-                           ReaderState& reader) MAUVE_RT {
+    static DataStatus find(ActionClient& owner, Feedback& value, time_ns_t& time_ns, ReaderState& reader)
+        MAUVE_RT {
       return owner.read_feedback([&]() MAUVE_RT { value = owner.feedback_; }, time_ns, reader);
     }
   };
   struct ResultPart {
-    static DataStatus find(ActionClient& owner, Result& value, time_ns_t& time_ns,
-                           ReaderState& reader) MAUVE_RT {
+    static DataStatus find(ActionClient& owner, Result& value, time_ns_t& time_ns, ReaderState& reader)
+        MAUVE_RT {
       return owner.read_result([&]() MAUVE_RT { value = owner.result_; }, time_ns, reader);
     }
   };

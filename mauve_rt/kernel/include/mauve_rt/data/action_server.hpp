@@ -33,8 +33,8 @@ struct ActionCounts {
   std::uint64_t refused{0};  // decisions of components that fit no goal
 };
 
-/// Another state of a goal, or feedback about it, for who carries them outside.
-struct GoalNews {
+/// Another state of a goal, or feedback about the goal, for the carrier.
+struct GoalEvent {
   GoalId id{};
   std::uint32_t number{0};
   GoalState state{GoalState::unknown};
@@ -45,12 +45,12 @@ struct GoalNews {
 
 /// An action server seen without its type. Its goals are executed one after another: the oldest accepted one is the current one.
 ///
-/// Who carries goals puts them in by ask(); the component answers in the declared time, by a read of its status where no port is
-/// connected to `asked`, else by a decision. Whatever ends without the component's decision says why (GoalReason).
+/// The carrier of goals (the bridge, or a GoalSender) calls ask(). The component answers in the declared time: by a read of `status`
+/// where no port is connected to `asked`, else by a decision. A goal that ends without a decision has a GoalReason.
 ///
 /// | member                | written by                             | read by            | under            |
 /// | --------------------- | -------------------------------------- | ------------------ | ---------------- |
-/// | places_, current_, sequence_, counts_, next_number_ | component, who carries | both      | mutex_           |
+/// | slots_, current_, sequence_, counts_, next_number_ | component, carrier | both      | mutex_           |
 /// | what a derived class keeps of goals, results and feedback | both | both               | mutex_           |
 /// | what it takes in, and hands out | requests' thread; sender's thread | same          | -                |
 /// | floor_                | commits, who deploys                   | component          | its own          |
@@ -66,51 +66,51 @@ class ActionServerBase : public Resource {
   /// [non-rt]
   ActionCounts counts() const;
 
-  // ---- who carries goals; asks and cancels on one thread
+  // ---- the carrier; asks and cancels on one thread
 
   /// A goal comes, as rosidl's <Type>_Goal. None when it waits for its answer now, else why it is rejected at once. [non-rt]
   GoalReason ask(const GoalId& id, std::span<const std::byte> message, time_ns_t now_ns);
   /// Its client asks to cancel a goal; false: no such goal is accepted and has not ended. [non-rt]
   bool cancel(const GoalId& id, time_ns_t now_ns);
 
-  // ---- the same, on one thread
+  // ---- the carrier; takes events on one thread
 
-  /// What is to be told of a goal, the oldest goal first; false: nothing. A final state is given once, then the goal is forgotten.
+  /// The next state or feedback to report, of the oldest goal first; false: there is none. After its final state a goal is gone.
   /// `message`: the feedback, as rosidl's <Type>_Feedback, or of a goal that has ended its <Type>_Result.
   /// [non-rt]
-  bool next_news(GoalNews& news, std::vector<std::byte>& message);
-  /// Ends what took too long, or what no component serves any more; returns when to look again. [non-rt]
-  time_ns_t look(time_ns_t now_ns);
-  /// Who carries goals goes: all end as removed. [non-rt]
+  bool next_event(GoalEvent& event, std::vector<std::byte>& message);
+  /// Rejects goals that were not answered in time, and ends all when no component serves; returns when to call it again. [non-rt]
+  time_ns_t poll(time_ns_t now_ns);
+  /// The carrier goes: all goals end as removed. [non-rt]
   void close(time_ns_t now_ns);
 
  protected:
   /// Offers all services, these of the action's own types among them. [setup]
   void offer_all(ServiceBase& goal, ServiceBase& asked, ServiceBase& feedback, ServiceBase& result);
-  /// Reads a goal into a place of its own; false: malformed. [non-rt]
+  /// Reads a goal into a buffer; false: malformed. [non-rt]
   virtual bool take_in(std::span<const std::byte> message) = 0;
   /// Keeps the goal that was taken in; keeps the present result as that goal's, and begins another one. [rt] Under mutex_.
-  virtual void keep_goal(std::size_t place) MAUVE_RT = 0;
-  virtual void keep_result(std::size_t place) MAUVE_RT = 0;
-  /// Copies them to a place of its own. [rt] Under mutex_.
+  virtual void keep_goal(std::size_t slot) MAUVE_RT = 0;
+  virtual void keep_result(std::size_t slot) MAUVE_RT = 0;
+  /// Copies them to a buffer. [rt] Under mutex_.
   virtual void copy_feedback() MAUVE_RT = 0;
-  virtual void copy_result(std::size_t place) MAUVE_RT = 0;
+  virtual void copy_result(std::size_t slot) MAUVE_RT = 0;
   /// Those copies as messages. [non-rt]
   virtual void put_feedback(std::vector<std::byte>& message) const = 0;
   virtual void put_result(std::vector<std::byte>& message) const = 0;
 
   // ---- the component
 
-  /// As ReadService::read(). `copy` gets the place of the goal, under mutex_. [rt]
+  /// As ReadService::read(). `copy` gets the slot of the goal, under mutex_. [rt]
   template <typename Copy>
   DataStatus read_goal(Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     const LockGuard lock(mutex_);
-    return read_place(current_, copy, time_ns, reader);
+    return read_slot(current_, copy, time_ns, reader);
   }
   template <typename Copy>
   DataStatus read_asked(Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT {
     const LockGuard lock(mutex_);
-    return read_place(oldest(GoalState::unknown), copy, time_ns, reader);
+    return read_slot(oldest(GoalState::unknown), copy, time_ns, reader);
   }
   /// Feedback about the current goal, or its result: `keep` copies it under mutex_. Without a goal nothing happens, nor in a stop. [rt]
   template <typename Keep>
@@ -131,21 +131,21 @@ class ActionServerBase : public Resource {
     return true;
   }
   WriteFloor& floor() MAUVE_RT { return floor_; }
-  std::size_t places() const noexcept { return places_.size(); }
+  std::size_t slots() const noexcept { return slots_.size(); }
 
  private:
   static constexpr std::size_t kNone = SIZE_MAX;
 
   /// A goal, or room for one.
-  struct Place {
+  struct Slot {
     bool is_used{false};
     GoalId id{};
     std::uint32_t number{0};
     GoalState state{GoalState::unknown};
     GoalReason reason{GoalReason::none};
-    GoalState told{GoalState::unknown};  // the last one that next_news() gave
-    time_ns_t due_ns{0};                 // to be answered
-    time_ns_t since_ns{0};               // when it came, or became the current one
+    GoalState reported{GoalState::unknown};  // the last one that next_event() gave
+    time_ns_t due_ns{0};                     // to be answered
+    time_ns_t since_ns{0};                   // when it came, or became the current one
   };
 
   /// The services that are the same for all actions, of one port each: one component serves.
@@ -191,8 +191,8 @@ class ActionServerBase : public Resource {
   bool may_give(time_ns_t time_ns) const noexcept {
     return current_ != kNone && time_ns > stop_ns() && floor_.admits(time_ns);
   }
-  void accept(std::size_t place, time_ns_t now_ns) noexcept;
-  void end(std::size_t place, GoalState state, GoalReason reason, time_ns_t now_ns) noexcept;
+  void accept(std::size_t slot, time_ns_t now_ns) noexcept;
+  void end(std::size_t slot, GoalState state, GoalReason reason, time_ns_t now_ns) noexcept;
   void end_all(GoalReason reason, time_ns_t now_ns) noexcept;
   void begin_next(time_ns_t now_ns) noexcept;
   void changed(time_ns_t now_ns) noexcept;
@@ -200,13 +200,13 @@ class ActionServerBase : public Resource {
 
   /// [rt]
   template <typename Copy>
-  DataStatus read_place(std::size_t place, Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
+  DataStatus read_slot(std::size_t slot, Copy copy, time_ns_t& time_ns, ReaderState& reader) MAUVE_RT;
 
   const std::size_t goals_;
   const time_ns_t answer_ns_;
   mutable PiMutex mutex_;
   WriteFloor floor_;
-  std::vector<Place> places_;
+  std::vector<Slot> slots_;
   std::size_t current_{kNone};
   bool has_feedback_{false};
   std::uint32_t next_number_{1};
@@ -222,12 +222,12 @@ class ActionServerBase : public Resource {
 
 /// [rt] Under mutex_.
 template <typename Copy>
-DataStatus ActionServerBase::read_place(std::size_t place, Copy copy, time_ns_t& time_ns, ReaderState& reader)
+DataStatus ActionServerBase::read_slot(std::size_t slot, Copy copy, time_ns_t& time_ns, ReaderState& reader)
     MAUVE_RT {
-  if (place == kNone) return DataStatus::none;
-  copy(place);
-  time_ns = places_[place].since_ns;
-  return reader.look(places_[place].number);
+  if (slot == kNone) return DataStatus::none;
+  copy(slot);
+  time_ns = slots_[slot].since_ns;
+  return reader.look(slots_[slot].number);
 }
 
 /// Offers `status`, `goal` and `asked` to read, `decide`, `feedback` and `result` to write.
@@ -240,20 +240,20 @@ class ActionServer final : public ActionServerBase {
 
   explicit ActionServer(std::int64_t goals = 1, time_ns_t answer_ns = kDefaultAnswerTime)
       : ActionServerBase(std::string(ActionTraits<A>::name), goals, answer_ns),
-        goals_(places()),
-        results_(places()) {
+        goals_(slots()),
+        results_(slots()) {
     offer_all(goal, asked, feedback, result);
   }
 
  protected:
   bool take_in(std::span<const std::byte> message) override { return CdrReader(message).get(*taken_in_); }
-  void keep_goal(std::size_t place) noexcept override {
-    goals_[place] = *taken_in_;
-    results_[place] = {};
+  void keep_goal(std::size_t slot) noexcept override {
+    goals_[slot] = *taken_in_;
+    results_[slot] = {};
   }
-  void keep_result(std::size_t place) noexcept override { results_[place] = std::exchange(result_, {}); }
+  void keep_result(std::size_t slot) noexcept override { results_[slot] = std::exchange(result_, {}); }
   void copy_feedback() noexcept override { *feedback_out_ = feedback_; }
-  void copy_result(std::size_t place) noexcept override { *result_out_ = results_[place]; }
+  void copy_result(std::size_t slot) noexcept override { *result_out_ = results_[slot]; }
   void put_feedback(std::vector<std::byte>& message) const override {
     CdrWriter(message).put(*feedback_out_);
   }
@@ -279,7 +279,9 @@ class ActionServer final : public ActionServerBase {
    public:
     Write(ActionServer& owner, const char* name) : WriteService<T>(name), owner_(owner) {}
     std::uint32_t max_ports() const noexcept override { return 1; }
-    bool write(const T& value, time_ns_t time_ns) noexcept override { return Part::put(owner_, value, time_ns); }
+    bool write(const T& value, time_ns_t time_ns) noexcept override {
+      return Part::put(owner_, value, time_ns);
+    }
     /// Of a stop: `decide` alone acts then.
     TryWrite try_write(const T& /*value*/, time_ns_t /*time_ns*/) noexcept override { return TryWrite::done; }
     void raise_floor(time_ns_t instant_ns) noexcept override { owner_.floor().raise(instant_ns); }
@@ -290,16 +292,16 @@ class ActionServer final : public ActionServerBase {
   };
 
   struct GoalPart {
-    static DataStatus find(ActionServer& owner, Goal& value, time_ns_t& time_ns,
-                           ReaderState& reader) MAUVE_RT {
-      const auto copy = [&](std::size_t place) MAUVE_RT { value = owner.goals_[place]; };
+    static DataStatus find(ActionServer& owner, Goal& value, time_ns_t& time_ns, ReaderState& reader)
+        MAUVE_RT {
+      const auto copy = [&](std::size_t slot) MAUVE_RT { value = owner.goals_[slot]; };
       return owner.read_goal(copy, time_ns, reader);
     }
   };
   struct AskedPart {
-    static DataStatus find(ActionServer& owner, Goal& value, time_ns_t& time_ns,
-                           ReaderState& reader) MAUVE_RT {
-      const auto copy = [&](std::size_t place) MAUVE_RT { value = owner.goals_[place]; };
+    static DataStatus find(ActionServer& owner, Goal& value, time_ns_t& time_ns, ReaderState& reader)
+        MAUVE_RT {
+      const auto copy = [&](std::size_t slot) MAUVE_RT { value = owner.goals_[slot]; };
       return owner.read_asked(copy, time_ns, reader);
     }
   };
@@ -315,7 +317,7 @@ class ActionServer final : public ActionServerBase {
   };
 
   // Under the base's mutex:
-  std::vector<Goal> goals_;      // by place
+  std::vector<Goal> goals_;      // by slot
   std::vector<Result> results_;  // of goals that have ended
   Result result_{};              // of the current one
   Feedback feedback_{};

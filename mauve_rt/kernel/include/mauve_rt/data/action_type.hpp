@@ -30,10 +30,10 @@ enum class GoalState : std::uint8_t {
 enum class GoalReason : std::uint8_t {
   none = 0,
   stopped,    // the component was stopped, or is FAULTED
-  removed,    // no component is connected any more, or the resource is removed
+  removed,    // no component is connected now, or the resource is removed
   no_answer,  // within the declared time
   full,       // there are as many goals as allowed
-  no_server,  // nobody offers the action, or who did is gone
+  no_server,  // no server is there, or it has gone
   malformed,  // a message that does not fit the declared type
 };
 

@@ -33,12 +33,12 @@ inline std::uint64_t goal_of_id(const GoalId& id) {
 ///   GoalSender<Drive> drive(server, [&] { return host.now_ns(); });
 ///   const std::uint64_t goal = drive.ask({.distance = 2.0});
 ///   simulation.run_until(...);
-///   EXPECT_EQ(GoalState::succeeded, drive.news().back().state);
+///   EXPECT_EQ(GoalState::succeeded, drive.events().back().state);
 template <DescribedAction A>
 class GoalSender {
  public:
   /// Another state of a goal, or feedback about the goal.
-  struct News {
+  struct Event {
     std::uint64_t goal;  // as ask() returned it
     GoalState state;
     GoalReason reason;
@@ -60,14 +60,14 @@ class GoalSender {
   /// Asks to cancel a goal; false: the goal is not accepted, or has ended.
   bool cancel(std::uint64_t goal) { return server_.cancel(id_of_goal(goal), now_()); }
   /// What became of the goals since the last call; states in between may be missing.
-  std::vector<News> news() {
-    std::vector<News> found = std::exchange(rejected_, {});
-    server_.look(now_());
-    for (GoalNews news; server_.next_news(news, message_);) {
-      News& made =
-          found.emplace_back(News{.goal = goal_of_id(news.id), .state = news.state, .reason = news.reason});
-      if (news.has_feedback) CdrReader(message_).get(made.feedback.emplace());
-      if (news.has_result) CdrReader(message_).get(made.result.emplace());
+  std::vector<Event> events() {
+    std::vector<Event> found = std::exchange(rejected_, {});
+    server_.poll(now_());
+    for (GoalEvent event; server_.next_event(event, message_);) {
+      Event& made = found.emplace_back(
+          Event{.goal = goal_of_id(event.id), .state = event.state, .reason = event.reason});
+      if (event.has_feedback) CdrReader(message_).get(made.feedback.emplace());
+      if (event.has_result) CdrReader(message_).get(made.result.emplace());
     }
     return found;
   }
@@ -77,7 +77,7 @@ class GoalSender {
   Now now_;
   std::uint64_t asked_{0};
   std::vector<std::byte> message_;
-  std::vector<News> rejected_;
+  std::vector<Event> rejected_;
 };
 
 }  // namespace mauve
