@@ -307,8 +307,8 @@ bool OfferedAction::accept(const GoalId& id, Goal& goal) {
 
 /// By the events of rcl that lead there: states in between may be missing.
 void OfferedAction::follow(const GoalEvent& event, Goal& goal) {
-  const auto update = [&](rcl_action_goal_event_t event) {
-    went_well(rcl_action_update_goal_state(goal.handle, event));
+  const auto update = [&](rcl_action_goal_event_t change) {
+    went_well(rcl_action_update_goal_state(goal.handle, change));
   };
   rcl_action_goal_state_t state = GOAL_STATE_UNKNOWN;
   if (!went_well(rcl_action_goal_handle_get_status(goal.handle, &state))) return;
