@@ -166,8 +166,7 @@ class Operator {
     const mauve::time_ns_t end_ns = simulation_.now_ns() + time_ns;
     while (simulation_.now_ns() < end_ns) {
       simulation_.run_until(std::min(end_ns, simulation_.now_ns() + mauve::ms_to_ns(100)));
-      robot.drive_to().look(simulation_.now_ns());
-      take_news();
+      take_events();
     }
   }
   /// Until the goal has ended, for at most this time.
@@ -181,14 +180,10 @@ class Operator {
     goal.pose.header.frame_id = frame;
     goal.pose.pose.position.x = x;
     goal.pose.pose.position.y = y;
-    std::vector<std::byte> request;
-    mauve::CdrWriter writer(request);
-    writer.put(mauve::GoalId{++goals_});
-    writer.put(goal);
-    ASSERT_EQ(mauve::GoalReason::none, robot.drive_to().ask(request, id_, simulation_.now_ns()));
+    goal_ = sender_.ask(goal);
     state = mauve::GoalState::unknown;
   }
-  void cancel() { EXPECT_TRUE(robot.drive_to().cancel(id_, simulation_.now_ns())); }
+  void cancel() { EXPECT_TRUE(sender_.cancel(goal_)); }
   void replace_guidance() {
     mauve::Transaction change;
     change.replace_core("guidance", std::make_unique<Guidance>());
@@ -206,28 +201,22 @@ class Operator {
   DriveTo::Result result;
 
  private:
-  void take_news() {
-    mauve::GoalEvent event;
-    std::vector<std::byte> message;
-    while (robot.drive_to().next_event(event, message)) {
-      mauve::CdrReader reader(message);
-      mauve::GoalId id{};
-      std::int8_t final_state = 0;
-      if (event.has_feedback) {
-        EXPECT_TRUE(reader.get(id) && reader.get(feedback.emplace_back()));
+  void take_events() {
+    for (const auto& event : sender_.events()) {
+      EXPECT_EQ(goal_, event.goal);
+      if (event.feedback) {
+        feedback.push_back(*event.feedback);
       } else {
         state = event.state;
       }
-      if (event.has_result) {
-        EXPECT_TRUE(reader.get(final_state) && reader.get(result));
-      }
+      if (event.result) result = *event.result;
     }
   }
 
   mauve::Simulation simulation_;
   mauve::SimulatedHost* host_{nullptr};
-  mauve::GoalId id_{};
-  std::uint8_t goals_{0};
+  mauve::GoalSender<DriveTo> sender_{robot.drive_to(), [this] { return simulation_.now_ns(); }};
+  std::uint64_t goal_{0};
 };
 
 TEST(Components, AnOperatorsGoalIsReadInAnyFrameAndGoesFirst) {
