@@ -11,8 +11,7 @@ namespace mauve_examples {
 
 namespace {
 
-constexpr mauve::time_ns_t kGoalPatience_ns =
-    mauve::s_to_ns(10);  // a robot that stands for so long aborts its goal
+constexpr mauve::time_ns_t kGoalPatience_ns = mauve::s_to_ns(10);  // so long a robot with a goal may stand
 constexpr double kUnknown_m = std::numeric_limits<double>::quiet_NaN();
 constexpr double kAnywhere_m = std::numeric_limits<double>::infinity();
 
