@@ -67,8 +67,6 @@ void ActionClientBase::enter(GoalState state, GoalReason reason, time_ns_t now_n
     default:
       break;
   }
-  if (reason != GoalReason::none)
-    log().warn("goal {} is {}: {}", number_, to_string(state), to_string(reason));
 }
 
 void ActionClientBase::cancel_locked(time_ns_t time_ns) noexcept {
@@ -152,24 +150,35 @@ void ActionClientBase::finish(std::uint32_t number, GoalState state, std::span<c
 }
 
 void ActionClientBase::give_up(std::uint32_t number, GoalReason reason, time_ns_t now_ns) {
+  GoalState state{};
   {
     const LockGuard lock(mutex_);
     if (!is_present(number)) return;
-    enter(state_ == GoalState::unknown ? GoalState::rejected : GoalState::aborted, reason, now_ns);
+    state = state_ == GoalState::unknown ? GoalState::rejected : GoalState::aborted;
+    enter(state, reason, now_ns);
   }
+  report(number, state, reason);
   written(now_ns);
 }
 
 time_ns_t ActionClientBase::poll(time_ns_t now_ns) {
+  std::uint32_t number = 0;
   {
     const LockGuard lock(mutex_);
     if (!is_open() || state_ != GoalState::unknown) return kForever;
     if (now_ns < due_ns_) return due_ns_;
     is_to_send_ = false;
+    number = number_;
     enter(GoalState::rejected, GoalReason::no_answer, now_ns);
   }
+  report(number, GoalState::rejected, GoalReason::no_answer);
   written(now_ns);
   return kForever;
+}
+
+/// Not where a component's thread or the watchdog ends a goal: such a thread waits for nothing.
+void ActionClientBase::report(std::uint32_t number, GoalState state, GoalReason reason) const {
+  log().warn("goal {} is {}: {}", number, to_string(state), to_string(reason));
 }
 
 // ---- the component

@@ -142,8 +142,6 @@ void ActionServerBase::end(std::size_t slot, GoalState state, GoalReason reason,
                                                         : counts_.rejected;
   ++count;
   changed(now_ns);
-  if (reason != GoalReason::none)
-    log().warn("goal {} is {}: {}", goal.number, to_string(state), to_string(reason));
   if (slot != current_) return;
   keep_result(slot);
   has_feedback_ = false;
@@ -238,6 +236,9 @@ bool ActionServerBase::next_event(GoalEvent& event, std::vector<std::byte>& mess
       slot.is_used = false;
     }
   }
+  // Here, as what ends a goal may run on a thread that must not wait, the watchdog's for one.
+  if (event.reason != GoalReason::none)
+    log().warn("goal {} is {}: {}", event.number, to_string(event.state), to_string(event.reason));
   if (event.has_feedback) put_feedback(message);
   if (event.has_result) put_result(message);
   return true;

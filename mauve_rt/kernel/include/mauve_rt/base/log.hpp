@@ -364,7 +364,7 @@ class Log {
     constexpr std::size_t kPlaces =
         kTexts == 0 ? 0 : (LogLine::kMostArguments - kOthers) / kTexts;  // of each text
     if (!is_on(level)) return;
-    write_line(level, [&](LogLine& line) MAUVE_RT {
+    const auto fill = [&](LogLine& line) MAUVE_RT {
       line.format = format.text();
       line.place = format.place();
       std::size_t number = 0;
@@ -378,7 +378,8 @@ class Log {
       };
       (add(arguments), ...);
       if (number < LogLine::kMostArguments) line.arguments[number] = LogArgument::none;
-    });
+    };
+    MAUVE_RT_TRUSTED(write_line(level, fill));  // waits on ordinary threads only
   }
 
   const LogSource* source_;

@@ -146,6 +146,7 @@ class ActionClientBase : public Resource {
   void begin(time_ns_t time_ns) MAUVE_RT;
   void cancel_locked(time_ns_t time_ns) noexcept;
   void enter(GoalState state, GoalReason reason, time_ns_t now_ns) noexcept;
+  void report(std::uint32_t number, GoalState state, GoalReason reason) const;
 
   const time_ns_t answer_ns_;
   mutable PiMutex mutex_;
