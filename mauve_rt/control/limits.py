@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from mauve_rt._kernel import PluginRegistry
 from mauve_rt.control.requests import Code, RefusalError, Request
-from mauve_rt.model.resource_kinds import capacities, given_kinds
+from mauve_rt.model.resource_kinds import capacities, given_kinds, is_registered
 from mauve_rt.model.schema import ComponentModel, ResourceModel
 
 _TRACE_RECORD_BYTES = 48
@@ -70,6 +70,6 @@ def bytes_of_resource(resource: ResourceModel, registry: PluginRegistry) -> int:
     values = kind.values + sum(int(told[each.name]) * each.values_each for each in kind.parameters)
     depth = (resource.topic.qos.depth or 0) if resource.topic is not None and values else 0
     value_bytes = registry.value_bytes(resource.type, capacities(resource.parameters))
-    if not value_bytes and resource.type not in registry.names(kind.type_kind or "type"):
+    if not value_bytes and not is_registered(resource.type, kind, registry):
         value_bytes = int(told.get("max_bytes", 0))
     return value_bytes * (values + depth)

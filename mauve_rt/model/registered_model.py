@@ -20,7 +20,7 @@ from mauve_rt.errors import MauveError
 from mauve_rt.model.plugins import PluginLoader
 from mauve_rt.modelling.durations import duration_text
 from mauve_rt.modelling.schema import ModelFile
-from mauve_rt.modelling.type_names import action_of
+from mauve_rt.parts.message_types import action_of
 from mauve_rt.parts.model_core import ModelCore
 from mauve_rt.parts.part import Configurable
 

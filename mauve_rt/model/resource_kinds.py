@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from functools import cache
 from typing import Any
 
-from mauve_rt._kernel import ResourceKind, ResourceParameter, given_resource_kinds
+from mauve_rt._kernel import PluginRegistry, ResourceKind, ResourceParameter, given_resource_kinds
 from mauve_rt.file_schema.json_schema import JsonSchema, given, when
 from mauve_rt.file_schema.kinds import Fault, Faults, Flag, Kind, Real, Text, Whole
 from mauve_rt.file_schema.section import Setting
@@ -40,6 +40,11 @@ def has_key(kind: ResourceKind, key: str) -> bool:
 def given_kinds_with(key: str) -> tuple[str, ...]:
     """The given kinds that have a key."""
     return tuple(name for name, kind in given_kinds().items() if has_key(kind, key))
+
+
+def is_registered(name: str, kind: ResourceKind, registry: PluginRegistry) -> bool:
+    """Whether a loaded library has the type for resources of the kind."""
+    return bool(kind.type_kind) and name in registry.names(kind.type_kind)
 
 
 def needed_binding(kind: ResourceKind | None) -> str:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from mauve_rt._kernel import PluginRegistry, ResourceDescription
-from mauve_rt.model.resource_kinds import has_key
+from mauve_rt.model.resource_kinds import has_key, is_registered
 from mauve_rt.model.schema import ResourceModel
 from mauve_rt.parts.message_types import action_class, is_message, is_promised
 
@@ -22,8 +22,7 @@ def resource_part(resource: ResourceModel, registry: PluginRegistry) -> dict[str
         if of_section is not None:
             parameters[parameter.name] = round(of_section * 1e6)  # service.timeout_ms, action.answer_ms
     of_kind = registry.resource_kind(kind)
-    is_registered = bool(of_kind.type_kind) and name in registry.names(of_kind.type_kind)
-    if has_key(of_kind, "max_bytes") and not is_registered and _is_known(name):
+    if has_key(of_kind, "max_bytes") and not is_registered(name, of_kind, registry) and _is_known(name):
         return {"resource": DataOfKind(kind, name, **parameters)}
     if kind == _IN_PLACE and name not in registry.names("type") and is_promised(name):
         # Before the struct is generated: the same services. The file was checked for its limits.

@@ -12,8 +12,8 @@ from mauve_rt.modelling.durations import NS_OF, Duration
 from mauve_rt.modelling.keywords import languages_of_keyword
 from mauve_rt.modelling.schema import CoreModel, CppType, FsmModel, ModelFile, ShellModel, StateModel
 from mauve_rt.modelling.scope import Scope
-from mauve_rt.modelling.type_names import NUMBERS, TypeName, action_of
-from mauve_rt.parts.message_types import PARTS_OF_ACTIONS
+from mauve_rt.modelling.type_names import NUMBERS, TypeName
+from mauve_rt.parts.message_types import PARTS_OF_ACTIONS, action_of
 
 _RESERVED_OF_SHELLS = frozenset(
     """

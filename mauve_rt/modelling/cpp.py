@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping
 from mauve_rt.modelling.durations import Duration
 from mauve_rt.modelling.package_model import PackageModel
 from mauve_rt.modelling.schema import CppCall, CppType, PortModel, PropertyModel
-from mauve_rt.modelling.type_names import NUMBERS, TypeName, action_of
+from mauve_rt.modelling.type_names import NUMBERS, TypeName
+from mauve_rt.parts.message_types import action_of
 
 _INT64_MIN = -(2**63)
 

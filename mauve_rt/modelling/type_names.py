@@ -6,8 +6,6 @@ A port may have a message of an action as well, `mauve_msgs/action/DriveTo_Goal`
 import re
 from dataclasses import dataclass
 
-from mauve_rt.parts.message_types import PARTS_OF_ACTIONS
-
 NUMBERS = {
     "bool": "bool",
     "float32": "float",
@@ -57,12 +55,6 @@ class TypeName:
     def is_bounded(self) -> bool:
         """Whether its size has a limit."""
         return (self.item != "string" or bool(self.length)) and (not self.is_list or bool(self.count))
-
-
-def action_of(item: str) -> str:
-    """The action of a type such as `mauve_msgs/action/DriveTo_Goal`; empty: the type is no part of one."""
-    action, _, part = item.rpartition("_")
-    return action if part in PARTS_OF_ACTIONS and "/action/" in action else ""
 
 
 def parse_type(text: str) -> TypeName | None:

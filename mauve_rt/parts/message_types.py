@@ -40,9 +40,8 @@ def message_class(name: str) -> Any:
 
     None when it is no installed ROS message.
     """
-    action, _, part = name.rpartition("_")
-    if part in PARTS_OF_ACTIONS:
-        return getattr(action_class(action), part, None)
+    if action := action_of(name):
+        return getattr(action_class(action), name.removeprefix(f"{action}_"), None)
     found = _interface(name, "msg")
     return found if hasattr(found, "get_fields_and_field_types") else None
 
@@ -51,6 +50,12 @@ def service_class(name: str) -> Any:
     """The Python class of `package/srv/Name`; None when it is no installed ROS service."""
     found = _interface(name, "srv")
     return found if hasattr(found, "Request") and hasattr(found, "Response") else None
+
+
+def action_of(name: str) -> str:
+    """The action of a type such as `mauve_msgs/action/DriveTo_Goal`; empty: the type is no part of one."""
+    action, _, part = name.rpartition("_")
+    return action if part in PARTS_OF_ACTIONS and "/action/" in action else ""
 
 
 def action_class(name: str) -> Any:

@@ -56,10 +56,6 @@ void insert_id(const GoalId& id, std::vector<std::byte>& message) {
   message.insert(message.begin() + std::ssize(kCdrHeader), bytes.begin(), bytes.end());
 }
 
-std::string described(const ActionSettings& settings) {
-  return "resource " + settings.resource + ", action " + settings.name;
-}
-
 GoalId id_of(const std::uint8_t* bytes) {
   GoalId id{};
   std::copy_n(bytes, id.size(), id.begin());
@@ -102,14 +98,6 @@ GoalId random_id() {
   return id;
 }
 
-[[noreturn]] void throw_other_kind(const Resource& resource, const ActionSettings& settings,
-                                   const char* kind) {
-  throw Error(ErrorCode::type_mismatch, "the resource has no goals of that action",
-              {.element = "resource " + resource.name(),
-               .expected = std::string("a resource of kind ") + kind + " and type " + settings.type,
-               .found = "kind " + resource.kind() + ", type " + resource.type()});
-}
-
 }  // namespace
 
 SteadyClock::SteadyClock() {
@@ -135,32 +123,49 @@ bool ResultResponse::serialize_result(OwnedMessage& into) const {
   return went_well(rmw_serialize(result(), type_, into.get()));
 }
 
-// ---- a server
-
-OfferedAction::OfferedAction(rcl_node_t& node, const ActionSettings& settings)
+BoundAction::BoundAction(const rcl_node_t& node, const ActionSettings& settings)
     : Binding(settings.resource),
       settings_(settings),
       type_(action_type_support(settings.type)),
-      name_(full_name(node, settings.name)),
-      entity_(node, rcl_action_get_zero_initialized_server()),
       goal_request_(type_.goal_request),
       goal_response_(type_.goal_response),
       result_request_(type_.result_request),
       result_response_(type_),
-      feedback_(type_.feedback) {
+      feedback_(type_.feedback),
+      name_(full_name(node, settings.name)) {}
+
+std::string BoundAction::described() const {
+  return "resource " + settings_.resource + ", action " + settings_.name;
+}
+
+void BoundAction::check_kind(const Resource& resource, bool fits, const char* kind) const {
+  if (fits && resource.type() == settings_.type) return;
+  throw Error(ErrorCode::type_mismatch, "the resource has no goals of that action",
+              {.element = "resource " + resource.name(),
+               .expected = std::string("a resource of kind ") + kind + " and type " + settings_.type,
+               .found = "kind " + resource.kind() + ", type " + resource.type()});
+}
+
+ActionReport BoundAction::report_of(const ActionCounts& counts, bool is_offered) const {
+  return {.resource = resource_name(), .action = name_, .is_offered = is_offered, .counts = counts};
+}
+
+// ---- a server
+
+OfferedAction::OfferedAction(rcl_node_t& node, const ActionSettings& settings)
+    : BoundAction(node, settings), entity_(node, rcl_action_get_zero_initialized_server()) {
   rcl_action_server_options_t options = rcl_action_server_get_default_options();
   options.goal_service_qos.depth = kGoalRequests;
   check(rcl_action_server_init(entity_.get(), &node, clock_.get(), type_.action, settings.name.c_str(),
                                &options),
-        "the action cannot be offered", described(settings));
+        "the action cannot be offered", described());
   OwnedMessage unknown;
   if (result_response_.serialize_result(unknown))
     unknown_.assign(unknown.bytes().begin(), unknown.bytes().end());
 }
 
 void OfferedAction::attach(std::shared_ptr<Resource> resource) {
-  if (resource->action_server() == nullptr || resource->type() != settings_.type)
-    throw_other_kind(*resource, settings_, "action_server");
+  check_kind(*resource, resource->action_server() != nullptr, "action_server");
   Binding::attach(std::move(resource));
   server_ = this->resource().action_server();
 }
@@ -335,29 +340,16 @@ void OfferedAction::publish_status() {
 }
 
 void OfferedAction::report(BridgeReport& report) const {
-  report.actions.push_back({.resource = resource_name(),
-                            .action = name_,
-                            .is_offered = true,
-                            .counts = server_ != nullptr ? server_->counts() : ActionCounts{}});
+  report.actions.push_back(report_of(server_ != nullptr ? server_->counts() : ActionCounts{}, true));
 }
 
 // ---- a client
 
 CalledAction::CalledAction(rcl_node_t& node, const ActionSettings& settings)
-    : Binding(settings.resource),
-      settings_(settings),
-      node_(node),
-      type_(action_type_support(settings.type)),
-      name_(full_name(node, settings.name)),
-      entity_(node, rcl_action_get_zero_initialized_client()),
-      goal_request_(type_.goal_request),
-      goal_response_(type_.goal_response),
-      result_request_(type_.result_request),
-      result_response_(type_),
-      feedback_(type_.feedback) {
+    : BoundAction(node, settings), node_(node), entity_(node, rcl_action_get_zero_initialized_client()) {
   const rcl_action_client_options_t options = rcl_action_client_get_default_options();
   check(rcl_action_client_init(entity_.get(), &node, type_.action, settings.name.c_str(), &options),
-        "the action cannot be called", described(settings));
+        "the action cannot be called", described());
 }
 
 CalledAction::~CalledAction() {
@@ -365,8 +357,7 @@ CalledAction::~CalledAction() {
 }
 
 void CalledAction::attach(std::shared_ptr<Resource> resource) {
-  if (resource->action_client() == nullptr || resource->type() != settings_.type)
-    throw_other_kind(*resource, settings_, "action_client");
+  check_kind(*resource, resource->action_client() != nullptr, "action_client");
   Binding::attach(std::move(resource));
   client_ = this->resource().action_client();
 }
@@ -395,21 +386,29 @@ time_ns_t CalledAction::next_look_ns() const {
   const time_ns_t now_ns = monotonic_now_ns();
   const time_ns_t answer_ns = client_->poll(now_ns);
   const std::uint32_t number = client_->open_goal();
-  if (number == 0 || has_server()) {
+  if (number == 0) return answer_ns;
+  if (now_ns >= next_check_ns_) {  // the sender comes here after each message, and the graph is slow to ask
+    next_check_ns_ = now_ns + kServerEvery;
+    check_server(number, now_ns);
+  }
+  return std::min(answer_ns, next_check_ns_);
+}
+
+void CalledAction::check_server(std::uint32_t number, time_ns_t now_ns) const {
+  if (has_server()) {
     unseen_since_ns_ = kForever;
   } else if (unseen_since_ns_ == kForever) {
     unseen_since_ns_ = now_ns;
   } else if (now_ns - unseen_since_ns_ >= kServerGone) {
     client_->give_up(number, GoalReason::no_server, now_ns);
   }
-  return number == 0 ? answer_ns : std::min(answer_ns, now_ns + kServerEvery);
 }
 
 bool CalledAction::send() {
   send_cancel();
-  const GoalId id = random_id();
   std::uint32_t number = 0;
   if (!client_->next_goal(outgoing_, number)) return false;
+  const GoalId id = random_id();
   insert_id(id, outgoing_);
   send_goal(id, number);
   return true;
@@ -422,6 +421,7 @@ void CalledAction::send_goal(const GoalId& id, std::uint32_t number) {
   // The answer may come before this returns: it waits for the sequence number.
   const LockGuard lock(mutex_);
   goal_ = {.id = id, .number = number};
+  unseen_since_ns_ = kForever;  // has_server() has just seen it
   if (!went_well(rcl_action_send_goal_request(entity_.get(), goal_request_.get(), &goal_.asked)))
     refuse(GoalReason::no_server);
 }
@@ -511,10 +511,7 @@ void CalledAction::take_results() {
 }
 
 void CalledAction::report(BridgeReport& report) const {
-  report.actions.push_back({.resource = resource_name(),
-                            .action = name_,
-                            .is_offered = false,
-                            .counts = client_ != nullptr ? client_->counts() : ActionCounts{}});
+  report.actions.push_back(report_of(client_ != nullptr ? client_->counts() : ActionCounts{}, false));
 }
 
 }  // namespace mauve::bridge

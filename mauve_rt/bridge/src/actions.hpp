@@ -61,6 +61,38 @@ class ResultResponse {
   std::size_t offset_;
 };
 
+/// What both directions have in common: the type, and a message of each kind.
+class BoundAction : public Binding, protected Arrival {
+ public:
+  /// Throws Error when the type is not installed. [non-rt]
+  BoundAction(const rcl_node_t& node, const ActionSettings& settings);
+
+ protected:
+  std::size_t entities() const override {
+    return 3;
+  }  // services and a timer; or clients and two subscriptions
+  /// For messages about it: its resource and its name.
+  std::string described() const;
+  /// Throws Error (type_mismatch) unless `fits`, and the resource is of the action's type. [non-rt]
+  void check_kind(const Resource& resource, bool fits, const char* kind) const;
+  ActionReport report_of(const ActionCounts& counts, bool is_offered) const;
+
+ private:
+  const ActionSettings settings_;
+
+ protected:
+  const ActionTypeSupport type_;
+  TypedMessage goal_request_;
+  TypedMessage goal_response_;
+  TypedMessage result_request_;
+  ResultResponse result_response_;
+  TypedMessage feedback_;
+  OwnedMessage incoming_;
+
+ private:
+  const std::string name_;  // expanded and remapped
+};
+
 /// Offers a resource of kind action_server as a ROS action.
 ///
 /// | member               | used by                                  | under  |
@@ -69,7 +101,7 @@ class ResultResponse {
 /// | goal_request_ ... result_request_, incoming_, goal_ | who takes requests | - |
 /// | feedback_, message_  | who sends                                | -      |
 /// | goal_response_, result_response_ | both                         | mutex_ |
-class OfferedAction final : public Binding, private Arrival {
+class OfferedAction final : public BoundAction {
  public:
   /// Throws Error when the type is not installed or rcl refuses. [non-rt]
   OfferedAction(rcl_node_t& node, const ActionSettings& settings);
@@ -93,7 +125,6 @@ class OfferedAction final : public Binding, private Arrival {
   };
 
   void join(rcl_wait_set_t& set) override;
-  std::size_t entities() const override { return 3; }  // services; and a timer
   bool has_arrived(const rcl_wait_set_t& set) const override;
   void take() override;
   void take_goals();
@@ -108,20 +139,11 @@ class OfferedAction final : public Binding, private Arrival {
       MAUVE_REQUIRES(mutex_);
   void publish_status() MAUVE_REQUIRES(mutex_);
 
-  const ActionSettings settings_;
-  ActionTypeSupport type_;
-  const std::string name_;  // expanded and remapped
   SteadyClock clock_;
   Owned<rcl_action_server_t, rcl_action_server_fini> entity_;
   ActionServerBase* server_{nullptr};
   PiMutex mutex_;
   std::map<GoalId, Goal> goals_ MAUVE_GUARDED_BY(mutex_);
-  TypedMessage goal_request_;
-  TypedMessage goal_response_;
-  TypedMessage result_request_;
-  ResultResponse result_response_;
-  TypedMessage feedback_;
-  OwnedMessage incoming_;
   std::vector<std::byte> goal_;
   std::vector<std::byte> message_;
   std::vector<std::byte> unknown_;  // the result of a goal that is not known
@@ -134,8 +156,8 @@ class OfferedAction final : public Binding, private Arrival {
 /// | goal_                 | who sends             | who receives  | mutex_ |
 /// | goal_request_, outgoing_ | who sends          | -             | -      |
 /// | the other messages    | who receives          | -             | -      |
-/// | unseen_since_ns_      | who sends             | -             | -      |
-class CalledAction final : public Binding, private Arrival {
+/// | next_check_ns_, unseen_since_ns_ | who sends  | -             | -      |
+class CalledAction final : public BoundAction {
  public:
   /// Throws Error when the type is not installed or rcl refuses. [non-rt]
   CalledAction(rcl_node_t& node, const ActionSettings& settings);
@@ -159,7 +181,6 @@ class CalledAction final : public Binding, private Arrival {
   };
 
   void join(rcl_wait_set_t& set) override;
-  std::size_t entities() const override { return 3; }  // clients; and two subscriptions
   bool has_arrived(const rcl_wait_set_t& set) const override;
   void take() override;
   void take_answers();
@@ -169,24 +190,17 @@ class CalledAction final : public Binding, private Arrival {
   void send_goal(const GoalId& id, std::uint32_t number);
   void send_cancel();
   bool has_server() const;
+  void check_server(std::uint32_t number, time_ns_t now_ns) const;
   Goal present() const;
 
-  const ActionSettings settings_;
   rcl_node_t& node_;
-  ActionTypeSupport type_;
-  const std::string name_;  // expanded and remapped
   Owned<rcl_action_client_t, rcl_action_client_fini> entity_;
   ActionClientBase* client_{nullptr};
   mutable PiMutex mutex_;
   Goal goal_ MAUVE_GUARDED_BY(mutex_);
-  TypedMessage goal_request_;
-  TypedMessage goal_response_;
-  TypedMessage result_request_;
-  ResultResponse result_response_;
-  TypedMessage feedback_;
   std::vector<std::byte> outgoing_;
-  OwnedMessage incoming_;
   std::vector<std::byte> part_;
+  mutable time_ns_t next_check_ns_{0};           // of the server
   mutable time_ns_t unseen_since_ns_{kForever};  // the server
 };
 

@@ -211,8 +211,7 @@ class Diagnostics:
             "liveliness_lost": troubles.liveliness_lost,
             "incompatible_qos": troubles.incompatible_qos,
         }
-        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
-        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
+        return self._remarked(name, remarks, values)
 
     def _call(self, report: CallReport) -> Any:
         counts = report.counts
@@ -230,8 +229,7 @@ class Diagnostics:
             "timed_out": counts.timed_out,
             "refused": counts.other,
         }
-        level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
-        return self._status(name, level, "; ".join(remarks) or "no trouble", values)
+        return self._remarked(name, remarks, values)
 
     def _action(self, report: ActionReport) -> Any:
         counts = report.counts
@@ -248,6 +246,9 @@ class Diagnostics:
             "aborted": counts.aborted,
             "refused_decisions": counts.refused,
         }
+        return self._remarked(name, remarks, values)
+
+    def _remarked(self, name: str, remarks: Sequence[str], values: Mapping[str, object]) -> Any:
         level = DiagnosticStatus.WARN if remarks else DiagnosticStatus.OK
         return self._status(name, level, "; ".join(remarks) or "no trouble", values)
 
@@ -387,7 +388,7 @@ class Diagnostics:
         }
         return self._status("process", level, message, values)
 
-    def _status(self, name: str, level: bytes, message: str, values: dict[str, object]) -> Any:
+    def _status(self, name: str, level: bytes, message: str, values: Mapping[str, object]) -> Any:
         return DiagnosticStatus(
             level=level,
             name=f"{self._node.get_fully_qualified_name()}: {name}",

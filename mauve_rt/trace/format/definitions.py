@@ -16,8 +16,8 @@ _PRIMITIVES = frozenset(
 )
 _FIELD = re.compile(r"\s*(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+[A-Za-z]")
 _MESSAGE_NAME_PARTS = 3  # package/msg/Name
-_PART_OF_ACTION = re.compile(r"(?P<action>[^/]+/action/[^/_]+)_(?P<part>Goal|Result|Feedback)")
 _SECTIONS = ("Goal", "Result", "Feedback")  # of an .action file, between lines of ---
+_PART_OF_ACTION = re.compile(rf"(?P<action>[^/]+/action/[^/_]+)_(?P<part>{'|'.join(_SECTIONS)})")
 
 
 class Definition(NamedTuple):

@@ -40,7 +40,7 @@ inline ActionGoal decision(GoalState state, std::uint32_t number = 0) {
   return {.number = number, .state = static_cast<std::uint8_t>(state)};
 }
 
-/// Asks for goals, and keeps what is told of them.
+/// Asks for goals, and keeps the events of them.
 struct GoalCarrier {
   explicit GoalCarrier(ActionServerBase& asked) : server(asked) {}
 

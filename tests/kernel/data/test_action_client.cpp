@@ -91,7 +91,7 @@ TEST_F(ActionClients, AGoalThatIsNotAnsweredInTimeIsRejected) {
   client.poll(sent_ns + kAnswer);
   EXPECT_EQ(rejected, state());
   EXPECT_EQ(GoalReason::no_answer, found().its_reason());
-  EXPECT_FALSE(next()) << "nobody gets it any more";
+  EXPECT_FALSE(next()) << "it is not sent after that";
   client.answer(1, true, sent_ns + kAnswer + 1);
   EXPECT_EQ(rejected, state()) << "the answer came too late";
 }

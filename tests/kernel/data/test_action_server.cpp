@@ -77,7 +77,7 @@ TEST_F(ActionServers, RejectsMoreGoalsThanAllowed) {
   EXPECT_EQ(executing, state());
   EXPECT_TRUE(decide.write(decision(succeeded)));
   EXPECT_EQ(GoalReason::none, carrier.ask(255, 1))
-      << "there is room again, though nobody has asked for the result";
+      << "there is room again, although no client has asked for the result";
 }
 
 TEST_F(ActionServers, RejectsAGoalThatIsNoMessageOfTheType) {
