@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from mauve_rt.cli.bag_arguments import is_bag
 from mauve_rt.cli.verb import BAD_USAGE, FORECAST, NOT_PROVED, OK, REFUSED, REFUTED
 from mauve_rt.counts import counted
-from mauve_rt.unfinished import beside
+from mauve_rt.unfinished import beside, discard
 
 if TYPE_CHECKING:
     from mauve_rt.analysis.bounds import Bound, Subject
@@ -323,7 +323,7 @@ def _write(path: Path, declared: "Iterable[Machine]", filled: "Iterable[Machine]
         load_architecture(unfinished)
         unfinished.replace(whole)
     finally:
-        unfinished.unlink(missing_ok=True)
+        discard(unfinished)
     print(f"{path}: {counted(count, 'time')} written as wcet_ns; enforce_wcet enforces them", file=sys.stderr)
 
 

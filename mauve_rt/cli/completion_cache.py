@@ -18,7 +18,7 @@ from typing import Any
 
 from mauve_rt.node.shared.domain import DOMAIN, domain_problem
 from mauve_rt.node.shared.rtps_ports import discovery_sockets
-from mauve_rt.unfinished import beside
+from mauve_rt.unfinished import beside, discard
 
 _FORMAT = 1
 _MAX_BYTES = 1 << 20
@@ -153,7 +153,7 @@ class Cache:
                 else:
                     new.unlink()
             except OSError:
-                new.unlink(missing_ok=True)
+                discard(new)
 
     def note_found(self, names: Iterable[str], sockets: Iterable[str]) -> None:
         """Write that these executors are all that were found."""

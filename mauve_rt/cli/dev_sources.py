@@ -11,7 +11,8 @@ from mauve_rt.errors import ParameterError
 POLL_S = 0.2
 """Between two scans. A save is complete when two scans in a row find the same files."""
 _IDLE_SHARE = 10  # scans of a large tree take at most a tenth of the time of one CPU
-_SUFFIXES = (".cpp", ".hpp", ".h", ".cc", ".py", ".txt", ".cmake")
+_SUFFIXES_OF_C = (".c", ".cc", ".cpp", ".cxx", ".h", ".hh", ".hpp", ".hxx", ".inl", ".ipp", ".tpp")
+_SUFFIXES = (*_SUFFIXES_OF_C, ".py", ".txt", ".cmake")
 _NAMES = ("package.xml",)
 _FOLDERS_OF_BUILDS = ("build", "install", "log", "__pycache__")
 _MARKS_OF_BUILDS = ("COLCON_IGNORE", "CMakeCache.txt")
@@ -92,14 +93,19 @@ class Sources:
         found: dict[str, Stamp] = {}
         for path in self._paths:
             if path.is_dir():
-                found.update(_stamps(str(path)))
+                found.update(_stamps(str(path), set()))
             elif path.exists():
                 found[str(path)] = _stamp(path.stat())
         return found
 
 
-def _stamps(folder: str) -> Iterator[tuple[str, Stamp]]:
+def _stamps(folder: str, scanned: set[tuple[int, int]]) -> Iterator[tuple[str, Stamp]]:
+    """Links are followed: a package in src/ may be one. `scanned`: each folder is scanned once."""
     try:
+        status = Path(folder).stat()
+        if (status.st_dev, status.st_ino) in scanned:
+            return
+        scanned.add((status.st_dev, status.st_ino))
         with os.scandir(folder) as entries:
             listed = [*entries]
     except OSError:
@@ -108,9 +114,9 @@ def _stamps(folder: str) -> Iterator[tuple[str, Stamp]]:
         if entry.name.startswith("."):
             continue
         try:
-            if entry.is_dir(follow_symlinks=False):  # no cycle of links
+            if entry.is_dir():
                 if entry.name not in _FOLDERS_OF_BUILDS and not _is_of_build(entry.path):
-                    yield from _stamps(entry.path)
+                    yield from _stamps(entry.path, scanned)
             elif entry.name.endswith(_SUFFIXES) or entry.name in _NAMES:
                 yield entry.path, _stamp(entry.stat())
         except OSError:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from mauve_rt.counts import counted
 from mauve_rt.doctor.finding import Computer, Finding, Status, error, ok, warning
+from mauve_rt.scratch import scratch_folders
 
 _MEMORY = "/dev/shm"  # noqa: S108 - Fast DDS's
 _LEAST_MEMORY, _LEAST_DISK = 64 << 20, 1 << 30
@@ -56,7 +57,8 @@ def check_leftovers(computer: Computer) -> Iterator[Finding]:
     segments, hidden = _dead_segments(computer.path(_MEMORY))
     profiles = [
         file
-        for file in _listed(computer.path("/tmp"))  # noqa: S108 - names that cannot be guessed
+        for folder in scratch_folders()
+        for file in _listed(computer.path(str(folder)))
         if (match := _PROFILE.fullmatch(file.name)) and not computer.path(f"/proc/{match[1]}").exists()
     ]
     dead = [*segments, *profiles]

@@ -6,7 +6,8 @@ loaded. Its parts are in force for the registry: whatever is made from then on i
 
 import itertools
 import os
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -17,6 +18,7 @@ from mauve_rt.errors import PluginError
 from mauve_rt.model.base_classes import check_base_classes, derived_shells
 from mauve_rt.model.code_layouts import check_types, is_same_shell
 from mauve_rt.model.loaded_code import LoadedCode, Stamps
+from mauve_rt.scratch import code_folder
 
 MARK = "@"  # in the names of copies and modules of a generation
 PART_KINDS = ("shell", "core", "fsm", "resource")
@@ -117,16 +119,17 @@ class CodeGenerations:
         Raises:
             PluginError: nothing has changed for this process then, but for code that is never called.
         """
-        import tempfile  # noqa: PLC0415 - needed by a reload only
-
-        with tempfile.TemporaryDirectory(prefix="mauve_rt_") as folder:
+        with ExitStack() as stack:
+            folder = None
+            if not all(source.is_python for source in sources):
+                folder = stack.enter_context(_folder_of_copies())
             candidate = self._try(
                 sources,
                 registry,
                 in_use=in_use,
                 in_python=in_python,
                 source_of=source_of,
-                folder=Path(folder),
+                folder=folder,
             )
             if dry_run:
                 return None
@@ -222,7 +225,7 @@ class CodeGenerations:
         in_use: Collection[Name],
         in_python: Collection[Name],
         source_of: Callable[[str, str], str],
-        folder: Path,
+        folder: Path | None,
     ) -> _Candidate:
         from mauve_rt.model.plugin_trial import Copies, try_plugins  # noqa: PLC0415
 
@@ -236,7 +239,7 @@ class CodeGenerations:
             [Path(source.target) for source in libraries],
             list(modules.items()),
             generation=number,
-            copies=Copies(folder, changed),
+            copies=None if folder is None else Copies(folder, changed),
         )
         opened = tuple(Path(library) for library in answer["opened"])
         stale = [file for file, was in stamps.files.items() if Stamps([file]).files[file] != was]
@@ -317,6 +320,25 @@ class CodeGenerations:
         )
         self._history.append(generation)
         return generation
+
+
+@contextmanager
+def _folder_of_copies() -> Iterator[Path]:
+    """A new folder from which libraries can be loaded, until the end of a reload.
+
+    Raises:
+        PluginError: there is none.
+    """
+    import tempfile  # noqa: PLC0415 - needed by a reload only
+
+    parent, reasons = code_folder()
+    if parent is None:
+        text = f"copies of libraries: expected a folder to write and to load them, found none ({reasons})"
+        raise PluginError(
+            text, remedy="set TMPDIR of the executor to a folder that is writable, without noexec"
+        )
+    with tempfile.TemporaryDirectory(prefix=".mauve_rt_", dir=parent, ignore_cleanup_errors=True) as folder:
+        yield Path(folder)
 
 
 def _copied_name(library: Path, number: int) -> str:

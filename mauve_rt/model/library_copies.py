@@ -24,6 +24,7 @@ from mauve_rt.errors import PluginError
 from mauve_rt.model.elf_library import ElfLibrary, shown_name
 from mauve_rt.model.generation_names import library_name, symbol_name
 from mauve_rt.model.workspace_files import may_be_rebuilt
+from mauve_rt.unfinished import discard
 
 _OWN_MODULES = ("mauve_rt._kernel", "mauve_rt._bridge")
 _RTLD_DI_LINKMAP = 2
@@ -174,9 +175,10 @@ def _write(libraries: Iterable[ElfLibrary], folder: Path, generation: int) -> li
                 file.write(image)
     except OSError as error:
         for file_written in written:
-            file_written.unlink(missing_ok=True)
+            discard(file_written)
         where = error.filename or folder
-        raise PluginError(f"copies of libraries: {where} cannot be written: {error.strerror}") from None
+        text = f"copies of libraries: {where} cannot be written: {error.strerror}"
+        raise PluginError(text, remedy="set TMPDIR of the executor to a folder with room") from None
     return written
 
 

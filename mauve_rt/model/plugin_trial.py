@@ -16,7 +16,6 @@ import time
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from tempfile import TemporaryFile
 from typing import Any
 
 from mauve_rt.errors import PluginError, one_line
@@ -126,7 +125,7 @@ def _run(request: dict[str, Any], timeout_s: float) -> _Outcome:
     """Start the trial's process, and wait for its end. Nothing of its process group is left afterwards."""
     until_s = time.monotonic() + timeout_s
     with contextlib.ExitStack() as stack:
-        source = stack.enter_context(TemporaryFile())
+        source = stack.enter_context(os.fdopen(os.memfd_create("request"), "w+b"))
         reader, writer = os.pipe()
         stack.callback(os.close, reader)
         with os.fdopen(writer, "wb"):

@@ -11,6 +11,7 @@ from typing import Any
 
 from mauve_rt.errors import ParameterError
 from mauve_rt.modelling.source_templates import environment
+from mauve_rt.unfinished import discard
 
 _TEMPLATES = Path(__file__).with_name("templates")
 _KEPT = "__init__.py"  # parts share it: it is written where there is none
@@ -65,7 +66,7 @@ def write_parts(package: Path, files: Mapping[Path, str]) -> list[Path]:
             written.append(path)
     except OSError:
         for path in written:
-            (package / path).unlink(missing_ok=True)
+            discard(package / path)
         raise
     return written
 

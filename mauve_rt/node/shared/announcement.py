@@ -15,6 +15,8 @@ from pathlib import Path
 from mauve_rt.node.shared.discovery import PROFILES, has_own_profile
 from mauve_rt.node.shared.domain import domain
 from mauve_rt.node.shared.rtps_ports import discovery_ports
+from mauve_rt.scratch import scratch_folders
+from mauve_rt.unfinished import discard
 
 _MEMORY = "/dev/shm/fastrtps_"  # noqa: S108 - Fast DDS's
 _PARTICIPANTS = 32  # as the profiles have it
@@ -63,16 +65,20 @@ def _downwards(profile: str, domain: int) -> str:
 @contextmanager
 def _written(text: str) -> Iterator[str]:
     """The path of a temporary file with this text; "" where no file can be written."""
-    folder = os.environ.get("TMPDIR") or "/tmp"  # noqa: S108 - the name cannot be guessed, and is never reused
-    path = Path(folder, f"mauve_{os.getpid()}_{os.urandom(8).hex()}.xml")
+    name = f"mauve_{os.getpid()}_{os.urandom(8).hex()}.xml"  # cannot be guessed, and is never reused
+    path = next((path for folder in scratch_folders() if _is_written(path := folder / name, text)), None)
+    try:
+        yield str(path or "")
+    finally:
+        if path is not None:
+            discard(path)
+
+
+def _is_written(path: Path, text: str) -> bool:
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except OSError:
-        path.unlink(missing_ok=True)
-        yield ""
-        return
-    try:
-        yield str(path)
-    finally:
-        path.unlink(missing_ok=True)
+        discard(path)
+        return False
+    return True

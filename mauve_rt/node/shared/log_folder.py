@@ -7,7 +7,7 @@ temporary files takes its place. Where that one cannot be written either, there 
 import os
 from pathlib import Path
 
-from mauve_rt.node.shared.writable_folder import unwritable
+from mauve_rt.scratch import scratch_folders, unwritable
 
 LOG_FOLDER = "ROS_LOG_DIR"
 NO_LOG_FILES = ("--ros-args", "--disable-external-lib-logs")
@@ -44,9 +44,9 @@ def _problem_of_usual() -> str:
 
 def _temporary_folder() -> Path | None:
     """A folder of this account's own for temporary files; None where there is none."""
-    for parent in (os.environ.get("TMPDIR"), "/tmp", "/var/tmp", "/dev/shm"):  # noqa: S108 - owner is checked
-        folder = Path(parent, f"mauve_rt_log_{os.geteuid()}") if parent else None
-        if folder is not None and _is_own(folder) and not unwritable(folder):
+    for parent in scratch_folders():
+        folder = parent / f"mauve_rt_log_{os.geteuid()}"
+        if _is_own(folder) and not unwritable(folder):
             return folder
     return None
 

@@ -37,6 +37,7 @@ from mauve_rt.trace.bag.recorded import ReceivedBatch
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.mcap_chunk import Counts, PendingChunk
 from mauve_rt.trace.format.mcap_records import Opcode, record, room
+from mauve_rt.unfinished import discard
 
 MAGIC = b"\x89MCAP0\r\n"
 
@@ -87,7 +88,7 @@ class McapFile:
             unfinished.rename(path)
         except OSError as error:
             if self._descriptor >= 0:
-                unfinished.unlink(missing_ok=True)
+                discard(unfinished)
             self.abort()
             msg = f"bag file {path}: cannot be created ({error.strerror})"
             raise DiskError(msg) from error

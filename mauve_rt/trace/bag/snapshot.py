@@ -12,7 +12,7 @@ from mauve_rt.trace.bag.mcap_repair import examine
 from mauve_rt.trace.bag.repair import BagState, examine_bag, repair_bag
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part, silent
-from mauve_rt.unfinished import beside
+from mauve_rt.unfinished import beside, discard
 
 _TRIES = 5  # to copy a file between two writes; a copy across a write is repaired
 
@@ -56,7 +56,7 @@ def _copy(file: Path, to: Path) -> None:
             shutil.copyfile(file, to)
         except FileNotFoundError:
             if to.parent.exists() and file.parent.exists():  # deleted for the size of the bag
-                to.unlink(missing_ok=True)
+                discard(to)
                 return
             raise
         if examine(to).is_finished:

@@ -17,7 +17,7 @@ from mauve_rt.trace.bag.recorded import ReceivedBatch, TopicQos
 from mauve_rt.trace.bag.written_topic import WrittenTopic, counted_topic, declare_channel, declare_schema
 from mauve_rt.trace.errors import DiskError, TraceError
 from mauve_rt.trace.format.definitions import Definition, find_definition
-from mauve_rt.unfinished import beside
+from mauve_rt.unfinished import beside, discard
 
 _FILE_ROOM_BYTES, _METADATA_ROOM_BYTES = 8192, 4096
 """Kept in a file, and in metadata.yaml, for the reason of an interruption and the counts of a hundred topics
@@ -277,7 +277,7 @@ class BagWriter:
             self._flush(sync=True)
         except TraceError:
             self._file.abort()
-            self._file.path.unlink(missing_ok=True)
+            discard(self._file.path)
             self._complete.pop()
             self._file = before
             raise
@@ -349,7 +349,7 @@ class BagWriter:
         """Close without writing what waits; the bag stays as the last flush left it. May be called again."""
         self._opened.close()
         if self._complete and self._file.path.name not in self._told:  # new and empty
-            self._file.path.unlink(missing_ok=True)
+            discard(self._file.path)
         self._disk.close()
 
     def __enter__(self) -> Self:

@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.unfinished import beside
+from mauve_rt.unfinished import beside, discard
 
 
 @contextmanager
@@ -55,7 +55,7 @@ def _unfinished(path: Path, *, force: bool, folder: bool) -> Iterator[Path]:
             if place.is_dir():
                 shutil.rmtree(place, ignore_errors=True)
             else:
-                place.unlink(missing_ok=True)
+                discard(place)
     except OSError as error:
         raise TraceError(
             f"{path}: cannot be written ({error.strerror}); choose another place (--out)"
