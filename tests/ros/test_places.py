@@ -1,0 +1,148 @@
+"""Folders that a computer lacks or protects: programs work there, or refuse in one line with the remedy."""
+
+import os
+import shlex
+import subprocess
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+from rebuilt_package import RebuiltPackage
+from ros_processes import PATIENCE_S
+
+from mauve_rt import _kernel
+
+PREFIX = Path(_kernel.__file__).resolve().parents[4]
+NODE = "/robot_1/executor"
+ROBOT = """\
+mauve: 1
+executor: {namespace: /robot_1}
+components:
+  loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
+         alternatives: installed}
+resources:
+  sum: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: sum, direction: publish}}
+connections:
+  - [loop.sum, sum.write]
+"""
+NO_REMEDY = ""
+READ_ONLY = "mount -o remount,ro {}"
+FULL = "! dd if=/dev/zero of={}/all bs=4k count=99 2>/dev/null"
+NO_SHARED_MEMORY = (  # the devices that programs need, and no folder /dev/shm
+    "mkdir /mnt/dev && mount --rbind /dev /mnt/dev && mount -t tmpfs none /dev && "
+    "for name in null zero full random urandom tty; do touch /dev/$name && "
+    "mount --bind /mnt/dev/$name /dev/$name; done && ln -s /proc/self/fd /dev/fd"
+)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Folders as tmpfs of their own, each with what is done to it; HOME is home/ of the test."""
+
+    folders: Mapping[str, tuple[str, str]]
+    """By folder: mount options, and a command; `{}` is the folder."""
+    environment: Mapping[str, str] = field(default_factory=dict)
+    also: str = ":"
+    reload_remedy: str = NO_REMEDY
+    """The end of the line that refuses a reload; "" where a reload works."""
+
+
+def _all(options: str, command: str, *folders: str) -> dict[str, tuple[str, str]]:
+    return dict.fromkeys(folders, (options, command))
+
+
+TEMPORARY = ("/tmp", "/var/tmp")  # noqa: S108 - mounted in a namespace of the test's own
+EVERY = (*TEMPORARY, "/dev/shm", "{home}")  # noqa: S108
+SET_TMPDIR = "set TMPDIR of the executor to a folder that is writable, without noexec"
+PLACES = {
+    "read-only /tmp": Place(_all("size=1m", READ_ONLY, *TEMPORARY)),
+    "read-only /tmp and HOME": Place(_all("size=1m", READ_ONLY, *TEMPORARY, "{home}")),
+    "noexec /tmp": Place(_all("size=9m,noexec", ":", *TEMPORARY)),
+    "noexec everywhere": Place(_all("size=99m,noexec", ":", *EVERY), reload_remedy=SET_TMPDIR),
+    "no /dev/shm": Place({}, also=NO_SHARED_MEMORY),
+    "read-only /dev/shm": Place(_all("size=1m", READ_ONLY, "/dev/shm")),  # noqa: S108
+    "full /tmp": Place(_all("size=64k", FULL, *TEMPORARY)),
+    "full /dev/shm": Place(_all("size=64k", FULL, "/dev/shm")),  # noqa: S108
+    "full HOME": Place(_all("size=64k", FULL, "{home}")),
+    "missing HOME and TMPDIR": Place({}, {"HOME": "/proc/none", "TMPDIR": "/proc/none"}),
+}
+
+
+def _wrapper(place: Place, kept: Path) -> tuple[str, ...]:
+    """A wrapper that makes the place in a mount namespace; `kept` is as everywhere else, also below /tmp."""
+    keep = shlex.quote(str(kept))
+    steps = ["mount --make-rprivate /", "mount -t tmpfs none /mnt", "mkdir /mnt/kept"]
+    steps += [f"mount --bind {keep} /mnt/kept"]
+    for name, (options, command) in place.folders.items():
+        folder = shlex.quote(name.format(home=kept / "home"))
+        steps += [f"mkdir -p {folder}", f"mount -t tmpfs -o mode=1777,{options} none {folder}"]
+        if kept.is_relative_to(name):
+            steps += [f"mkdir -p {keep}", f"mount --bind /mnt/kept {keep}"]
+        steps.append(command.format(folder))
+    return ("unshare", "-m", "sh", "-c", f'{" && ".join([*steps, place.also])} && exec "$@"', "sh")
+
+
+@pytest.fixture(params=PLACES)
+def place(request: pytest.FixtureRequest) -> Place:
+    probe = ["unshare", "-m", "sh", "-c", "mount -t tmpfs none /mnt"]
+    done = subprocess.run(probe, check=False, capture_output=True, text=True, timeout=PATIENCE_S)
+    if done.returncode != 0:
+        pytest.skip(f"no folder can be mounted in a namespace: {done.stderr.strip()}")
+    return PLACES[request.param]
+
+
+def test_every_verb_works_or_names_the_remedy(
+    place: Place,
+    rebuilt: RebuiltPackage,
+    start_executor: Callable[..., Any],
+    tmp_path: Path,
+    domain: int,
+) -> None:
+    kept = rebuilt.builds.parent  # all that tests of this session write
+    (kept / "home").mkdir(exist_ok=True)
+    (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")
+    wrapper = _wrapper(place, kept)
+    given = {"HOME": str(kept / "home"), "ROS_DOMAIN_ID": str(domain), **place.environment}
+    executor = start_executor(
+        "-p",
+        f"architecture:={tmp_path}/robot.yaml",
+        "-p",
+        f"bags:={tmp_path}",
+        wrapper=wrapper,
+        environment=given,
+    )
+
+    def mauve(*words: str) -> subprocess.CompletedProcess[str]:
+        done = subprocess.run(
+            [*wrapper, PREFIX / "bin" / "mauve", *words],
+            env={**os.environ, **given},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=PATIENCE_S,
+        )
+        assert "Traceback" not in done.stdout + done.stderr
+        return done
+
+    def works(*words: str) -> str:
+        done = mauve(*words)
+        assert done.returncode == 0, f"{words}: {done.stdout}{done.stderr}\n{executor.output}"
+        return done.stdout
+
+    assert "loop" in works("list", NODE)
+    works("record", "start", NODE, "bag")
+    rebuilt.build("STEP=2.0")
+    reload = mauve("reload", NODE)
+    if place.reload_remedy:
+        assert (reload.returncode, place.reload_remedy in reload.stderr) == (1, True), reload
+    else:
+        assert reload.returncode == 0, f"{reload.stdout}{reload.stderr}"
+        assert str(rebuilt.library) in reload.stdout
+    works("record", "stop", NODE)
+    works("report", str(tmp_path / "bag"), "--out", str(tmp_path / "report.html"))
+    assert (tmp_path / "report.html").stat().st_size > 0
+    assert "Traceback" not in executor.output
+    executor.process.terminate()
+    assert executor.process.wait(PATIENCE_S) == 0, executor.output
