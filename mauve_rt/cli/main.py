@@ -22,12 +22,14 @@ from mauve_rt.cli.verb import BAD_USAGE, OK, run
 from mauve_rt.cli.verbs import VERBS
 from mauve_rt.node.shared.first_steps import take_first_steps
 from mauve_rt.node.shared.lean_start import leave_out_unused
+from mauve_rt.node.shared.shared_memory import refuse_ros_without_room
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one verb; returns the exit status."""
     if arguments is None:  # a process of its own
         take_first_steps("mauve")
+        refuse_ros_without_room()
     gc.disable()  # short-lived: looking for garbage in what is loaded is a tenth of the work
     leave_out_unused()
     parser = build_parser()

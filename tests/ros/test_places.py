@@ -27,6 +27,7 @@ resources:
 connections:
   - [loop.sum, sum.write]
 """
+BAD_INPUT = 2
 NO_REMEDY = ""
 READ_ONLY = "mount -o remount,ro {}"
 FULL = "! dd if=/dev/zero of={}/all bs=4k count=99 2>/dev/null"
@@ -64,7 +65,7 @@ PLACES = {
     "no /dev/shm": Place({}, also=NO_SHARED_MEMORY),
     "read-only /dev/shm": Place(_all("size=1m", READ_ONLY, "/dev/shm")),  # noqa: S108
     "full /tmp": Place(_all("size=64k", FULL, *TEMPORARY)),
-    "full /dev/shm": Place(_all("size=64k", FULL, "/dev/shm")),  # noqa: S108
+    "small /dev/shm": Place(_all("size=200k", ":", "/dev/shm")),  # noqa: S108
     "full HOME": Place(_all("size=64k", FULL, "{home}")),
     "missing HOME and TMPDIR": Place({}, {"HOME": "/proc/none", "TMPDIR": "/proc/none"}),
 }
@@ -84,15 +85,16 @@ def _wrapper(place: Place, kept: Path) -> tuple[str, ...]:
     return ("unshare", "-m", "sh", "-c", f'{" && ".join([*steps, place.also])} && exec "$@"', "sh")
 
 
-@pytest.fixture(params=PLACES)
-def place(request: pytest.FixtureRequest) -> Place:
+@pytest.fixture
+def mounts() -> None:
     probe = ["unshare", "-m", "sh", "-c", "mount -t tmpfs none /mnt"]
     done = subprocess.run(probe, check=False, capture_output=True, text=True, timeout=PATIENCE_S)
     if done.returncode != 0:
         pytest.skip(f"no folder can be mounted in a namespace: {done.stderr.strip()}")
-    return PLACES[request.param]
 
 
+@pytest.mark.usefixtures("mounts")
+@pytest.mark.parametrize("place", PLACES.values(), ids=PLACES)
 def test_every_verb_works_or_names_the_remedy(
     place: Place,
     rebuilt: RebuiltPackage,
@@ -146,3 +148,27 @@ def test_every_verb_works_or_names_the_remedy(
     assert "Traceback" not in executor.output
     executor.process.terminate()
     assert executor.process.wait(PATIENCE_S) == 0, executor.output
+
+
+@pytest.mark.usefixtures("mounts")
+@pytest.mark.parametrize("program", ["executor", "supervisor", "mauve"])
+def test_a_full_shared_memory_is_refused_before_ros_ends_the_process(program: str, tmp_path: Path) -> None:
+    """LTTng, which rcl loads, writes there: SIGBUS."""
+    wrapper = _wrapper(Place(_all("size=64k", FULL, "/dev/shm")), tmp_path)  # noqa: S108
+    (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")
+    words = {
+        "executor": ["lib/mauve_rt/executor", "--ros-args", "-p", f"architecture:={tmp_path}/robot.yaml"],
+        "supervisor": ["lib/mauve_rt/supervisor", "--ros-args", "-p", f"rules:={tmp_path}/robot.yaml"],
+        "mauve": ["bin/mauve", "list"],
+    }[program]
+    done = subprocess.run(
+        [*wrapper, PREFIX / words[0], *words[1:]],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=PATIENCE_S,
+    )
+    (line,) = done.stderr.splitlines()
+    assert done.returncode == BAD_INPUT
+    assert line.startswith(f"{program}: shared memory /dev/shm: expected 64 KiB free, found 0 KiB.")
+    assert line.endswith("--shm-size=256m.")

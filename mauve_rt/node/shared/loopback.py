@@ -29,6 +29,7 @@ from mauve_rt.node.shared.discovery import (
     opened_by,
     stays_on_this_machine,
 )
+from mauve_rt.node.shared.shared_memory import shared_memory_problem
 
 _OTHER_PROFILES, _TRANSPORTS = "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_BUILTIN_TRANSPORTS"
 _FILE_HERE = Path("DEFAULT_FASTRTPS_PROFILES.xml")  # which Fast DDS reads from the current folder
@@ -91,7 +92,7 @@ def loopback_environment(*, shared_memory: bool = True) -> dict[str, str | None]
         )
     if users_profile():
         return {}
-    by_udp = not shared_memory or os.environ.get(_TRANSPORTS) == "UDPv4"
+    by_udp = not shared_memory or os.environ.get(_TRANSPORTS) == "UDPv4" or shared_memory_problem()
     profile: dict[str, str | None] = {PROFILES: str(UDP_PROFILE if by_udp else PROFILE)}
     return profile if is_off() else profile | {RANGE: "SYSTEM_DEFAULT", LOCALHOST_ONLY: None}
 
@@ -107,7 +108,7 @@ def open_environment() -> dict[str, str | None]:
     reaches = os.environ.get(RANGE) in ("SUBNET", "SYSTEM_DEFAULT") and not stays_on_this_machine()
     if not is_fast_dds or not reaches or users_profile() or transports not in ("", "UDPv4"):
         return {}
-    return {PROFILES: str(OPEN_UDP_PROFILE if transports else OPEN_PROFILE)}
+    return {PROFILES: str(OPEN_UDP_PROFILE if transports or shared_memory_problem() else OPEN_PROFILE)}
 
 
 def waiting_transport() -> str:

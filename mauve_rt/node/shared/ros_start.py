@@ -8,6 +8,7 @@ from mauve_rt.node.shared.failures import more_open_files
 from mauve_rt.node.shared.lean_start import leave_out_unused
 from mauve_rt.node.shared.log_folder import choose_log_folder
 from mauve_rt.node.shared.loopback import LoopbackError, keep_to_this_machine
+from mauve_rt.node.shared.shared_memory import no_room_for_ros, shared_memory_problem
 from mauve_rt.node.shared.static_peers import resolve_static_peers, unresolved_text
 
 _FEW_FILES = 64  # enough for a small architecture only
@@ -31,9 +32,9 @@ def settle_ros_start() -> RosStart:
     Once, at the start of a program. No thread may be there that reads the environment while this runs.
 
     Raises:
-        RosStartError: a variable of the environment has a value that ROS cannot use.
+        RosStartError: a variable of the environment has a value that ROS cannot use, or /dev/shm is full.
     """
-    if problem := domain_problem():
+    if problem := domain_problem() or no_room_for_ros():
         raise RosStartError(problem)
     unresolved = resolve_static_peers()
     try:
@@ -43,7 +44,7 @@ def settle_ros_start() -> RosStart:
     leave_out_unused()
     arguments, logs = choose_log_folder()
     peers = unresolved_text(unresolved) if unresolved else ""
-    remarks = tuple(remark for remark in (logs, peers, _few_files()) if remark)
+    remarks = tuple(remark for remark in (logs, shared_memory_problem(), peers, _few_files()) if remark)
     return RosStart(arguments, remarks, unresolved)
 
 

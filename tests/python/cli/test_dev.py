@@ -63,7 +63,20 @@ def clock() -> Clock:
 
 
 @pytest.mark.parametrize(
-    "name", ["a.cpp", "a.hpp", "a.h", "a.cc", "a.py", "CMakeLists.txt", "x.cmake", "package.xml"]
+    "name",
+    [
+        "a.cpp",
+        "a.hpp",
+        "a.h",
+        "a.cc",
+        "a.cxx",
+        "a.hh",
+        "a.ipp",
+        "a.py",
+        "CMakeLists.txt",
+        "x.cmake",
+        "package.xml",
+    ],
 )
 def test_sources_are_watched(name: str, tmp_path: Path, clock: Clock) -> None:
     write(tmp_path / "core" / name)
@@ -108,6 +121,19 @@ def test_several_writes_are_one_save(tmp_path: Path, clock: Clock) -> None:
     save = scanned(sources, clock)
     assert save is not None
     assert [path.name for path in save.files] == ["a.cpp", "b.cpp", "c.cpp"]
+
+
+def test_a_package_that_is_a_link_is_watched_once_also_in_a_cycle(tmp_path: Path, clock: Clock) -> None:
+    write(tmp_path / "elsewhere" / "core.cpp")
+    source = tmp_path / "src"
+    source.mkdir()
+    for name in ("package", "same_package"):
+        (source / name).symlink_to(tmp_path / "elsewhere")
+    (tmp_path / "elsewhere" / "up").symlink_to(source)
+    sources = Sources([source], clock=clock)
+    assert sources.count == 1
+    write(tmp_path / "elsewhere" / "core.cpp", "new text")
+    assert settled(sources, clock) == ["core.cpp"]
 
 
 def test_a_path_that_is_not_there_is_refused(tmp_path: Path) -> None:
