@@ -3,7 +3,7 @@
 import os
 import shlex
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from rebuilt_package import RebuiltPackage
 from ros_processes import PATIENCE_S
 
 from mauve_rt import _kernel
+from mauve_rt.parts.ament_index import share_folder
 
 PREFIX = Path(_kernel.__file__).resolve().parents[4]
 NODE = "/robot_1/executor"
@@ -28,6 +29,7 @@ connections:
   - [loop.sum, sum.write]
 """
 BAD_INPUT = 2
+GROUPS = Path("/sys/fs/cgroup/cpu")
 NO_REMEDY = ""
 READ_ONLY = "mount -o remount,ro {}"
 FULL = "! dd if=/dev/zero of={}/all bs=4k count=99 2>/dev/null"
@@ -159,7 +161,7 @@ def test_a_full_shared_memory_is_refused_before_ros_ends_the_process(program: st
     words = {
         "executor": ["lib/mauve_rt/executor", "--ros-args", "-p", f"architecture:={tmp_path}/robot.yaml"],
         "supervisor": ["lib/mauve_rt/supervisor", "--ros-args", "-p", f"rules:={tmp_path}/robot.yaml"],
-        "mauve": ["bin/mauve", "list"],
+        "mauve": ["bin/mauve", "nodes"],
     }[program]
     done = subprocess.run(
         [*wrapper, PREFIX / words[0], *words[1:]],
@@ -172,3 +174,37 @@ def test_a_full_shared_memory_is_refused_before_ros_ends_the_process(program: st
     assert done.returncode == BAD_INPUT
     assert line.startswith(f"{program}: shared memory /dev/shm: expected 64 KiB free, found 0 KiB.")
     assert line.endswith("--shm-size=256m.")
+
+
+@pytest.fixture
+def group_without_realtime() -> Iterator[Path]:
+    """A cgroup whose real-time budget is 0, as that of a container."""
+    group = GROUPS / f"mauve_rt_test_{os.getpid()}"
+    try:
+        group.mkdir()
+    except OSError as error:
+        pytest.skip(f"no group can be made in {GROUPS}: {error.strerror}")
+    try:
+        if not (group / "cpu.rt_runtime_us").exists():
+            pytest.skip("the kernel has no real-time budgets of groups (CONFIG_RT_GROUP_SCHED)")
+        (group / "cpu.rt_runtime_us").write_text("0", "ascii")
+        yield group
+    finally:
+        group.rmdir()
+
+
+def test_a_group_without_realtime_has_a_remedy_of_its_own(
+    group_without_realtime: Path, start_executor: Callable[..., Any]
+) -> None:
+    if os.geteuid() != 0:
+        pytest.skip("only root has the right to SCHED_FIFO for certain")
+    architecture = share_folder("mauve_examples") / "architecture" / "metronome.yaml"
+    join = f'echo $$ > {group_without_realtime}/tasks && exec "$@"'
+    executor = start_executor("-p", f"architecture:={architecture}", wrapper=("sh", "-c", join, "sh"))
+    executor.await_output("activated")
+    executor.process.terminate()
+    assert executor.process.wait(PATIENCE_S) == 0, executor.output
+    (line,) = [line for line in executor.output.splitlines() if "no real time: SCHED_FIFO" in line]
+    assert "the cgroup has no real-time CPU time" in line
+    assert "--cpu-rt-runtime=950000" in line
+    assert "rtprio" not in line
