@@ -271,6 +271,25 @@ def test_the_plan_and_too_little_space_are_told_before_anything_is_begun(tmp_pat
     assert second == [*first[:-1], "the last time took 310.5 s on 2026-01-01"]
 
 
+@pytest.mark.parametrize("locale", ["C", "C.UTF-8"])
+def test_a_path_that_rosidl_cannot_use_is_refused_before_anything_is_begun(tmp_path: Path, locale: str):
+    clone = tmp_path / "wörk"
+    shutil.copytree(SCRIPTS, clone / "scripts", ignore=shutil.ignore_patterns("__pycache__"))
+    done = subprocess.run(
+        [clone / "scripts" / "setup"],
+        env={"PATH": os.defpath, "LC_ALL": locale},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        f"setup: {clone}: expected a path of ASCII letters, which rosidl needs. "
+        "Move the clone, such as to /opt/mauve_rt.\n"
+    )
+    assert [entry.name for entry in clone.iterdir()] == ["scripts"]
+
+
 def test_a_demo_builds_no_test_program():
     build = ROOT / "build"
     cache = build / "CMakeCache.txt"
