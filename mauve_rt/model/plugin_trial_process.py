@@ -123,6 +123,8 @@ def _open(registry: PluginRegistry, library: str) -> None:
     try:
         opened = ctypes.CDLL(library, mode=os.RTLD_NOW | os.RTLD_LOCAL)
     except OSError as error:
+        if "static TLS" in str(error):
+            registry.load_library(library)  # fails likewise, with the kernel's remedy
         raise PluginError(f"library {library} does not load: {error}") from None
     if _registers_plugins(opened, library):
         registry.load_library(library)

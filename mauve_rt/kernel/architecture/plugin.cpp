@@ -140,13 +140,26 @@ std::vector<ResourceKind> PluginRegistry::given_resource_kinds() {
                     GivenResources{});
 }
 
+/// By the loader's own words: it has no error codes.
+static std::string load_remedy(const std::string& reason) {
+  if (reason.find("static TLS") != std::string::npos) {
+    return "start the program with GLIBC_TUNABLES=glibc.rtld.optional_static_tls=65536 (each load takes some "
+           "of "
+           "these bytes, and they never return), or compile without -ftls-model=initial-exec";
+  }
+  if (reason.find("failed to map segment") != std::string::npos)
+    return "install its package in a folder that is mounted without noexec";
+  return "install its package, or rebuild it against this version";
+}
+
 void PluginRegistry::load_library(const std::string& path) {
   const LockGuard lock(mutex_);
   if (libraries_.contains(path)) return;
   void* library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
   if (library == nullptr) {
-    throw Error(ErrorCode::plugin, std::string("the plug-in library does not load: ") + dlerror(),
-                {.element = path, .remedy = "install its package, or rebuild it against this version"});
+    const std::string reason = dlerror();
+    throw Error(ErrorCode::plugin, "the plug-in library does not load: " + reason,
+                {.element = path, .remedy = load_remedy(reason)});
   }
   check_abi(library, path);
   using Register = void (*)(PluginRegistry&);

@@ -61,10 +61,11 @@ void RealtimeProcess::check_fifo(int priority) {
   rlimit limit{};
   getrlimit(RLIMIT_RTPRIO, &limit);
   if (limit.rlim_cur >= static_cast<rlim_t>(priority) || has_capability(CAP_SYS_NICE)) {
-    status_.deny("SCHED_FIFO priority " + std::to_string(priority) +
-                 " (this account has the right; the cgroup has no real-time CPU time, or the container forbids "
-                 "SCHED_FIFO): components run as SCHED_OTHER and can be late by milliseconds; to grant it start "
-                 "the container with --cpu-rt-runtime=950000 --cap-add=SYS_NICE, or leave the cgroup");
+    status_.deny(
+        "SCHED_FIFO priority " + std::to_string(priority) +
+        " (this account has the right; the cgroup has no real-time CPU time, or the container forbids "
+        "SCHED_FIFO): components run as SCHED_OTHER and can be late by milliseconds; to grant it start "
+        "the container with --cpu-rt-runtime=950000 --cap-add=SYS_NICE, or leave the cgroup");
     return;
   }
   status_.deny("SCHED_FIFO priority " + std::to_string(priority) + " (the rtprio limit is " +

@@ -160,6 +160,15 @@ def test_missing_symbol(build: Build) -> None:
     assert "undefined symbol: _Z16missing_functionv" in text
 
 
+def test_a_library_without_room_in_static_tls(build: Build) -> None:
+    tls = '__thread char room[65536] __attribute__((tls_model("initial-exec"))); char* get() { return room; }'
+    library = build(tls)
+    with pytest.raises(PluginError, match="cannot allocate memory in static TLS block") as caught:
+        try_plugins([library], [], generation=2)
+    assert "GLIBC_TUNABLES=glibc.rtld.optional_static_tls=65536" in str(caught.value)
+    assert "build it again" not in str(caught.value)
+
+
 def test_file_that_is_no_library(tmp_path: Path) -> None:
     library = tmp_path / "libtext.so"
     library.write_text("text", encoding="utf-8")
