@@ -22,7 +22,7 @@ def code_folder() -> tuple[Path | None, str]:
 
     HOME is the last one: /tmp, /var/tmp and /dev/shm are mounted with noexec together.
     """
-    reasons = []
+    reasons: list[str] = []
     home = os.environ.get("HOME")
     for folder in (*scratch_folders(), *([Path(home).absolute()] if home else [])):
         reason = _no_folder_for_code(folder)

@@ -69,7 +69,7 @@ def _run(arguments: list[str], interrupts: Interrupts) -> int:
     from mauve_examples.mission.demo_errors import BadInputError, MissionError  # noqa: PLC0415
     from mauve_examples.mission.demo_options import parse_options  # noqa: PLC0415
     from mauve_rt.node.shared.failures import failure_text  # noqa: PLC0415
-    from mauve_rt.node.shared.writable_folder import unwritable  # noqa: PLC0415
+    from mauve_rt.scratch import unwritable  # noqa: PLC0415
 
     options = parse_options(arguments)
     world = load_world(options.map_file, options.names, seed=options.seed)
