@@ -63,6 +63,7 @@ PLACES = {
     "read-only /tmp": Place(_all("size=1m", READ_ONLY, *TEMPORARY)),
     "read-only /tmp and HOME": Place(_all("size=1m", READ_ONLY, *TEMPORARY, "{home}")),
     "noexec /tmp": Place(_all("size=9m,noexec", ":", *TEMPORARY)),
+    "read-only everywhere": Place(_all("size=1m", READ_ONLY, *EVERY), reload_remedy=SET_TMPDIR),
     "noexec everywhere": Place(_all("size=99m,noexec", ":", *EVERY), reload_remedy=SET_TMPDIR),
     "no /dev/shm": Place({}, also=NO_SHARED_MEMORY),
     "read-only /dev/shm": Place(_all("size=1m", READ_ONLY, "/dev/shm")),  # noqa: S108
