@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 
 from rclpy.exceptions import NameValidationException
 from rclpy.lifecycle import LifecycleNode
@@ -105,7 +106,10 @@ def _numbers(resource: ResourceDescription, field: str) -> FlatNumbers:
     except MauveError:
         if not field:
             raise
-        remedy = did_you_mean(field, FlatNumbers(fields).names)
+        names = []
+        with suppress(MauveError):  # too many or none of them
+            names = FlatNumbers(fields).names
+        remedy = did_you_mean(field, names) if names else "mauve echo shows its fields"
         raise MauveError(f"{resource.type} has no number '{field}'; {remedy}") from None
 
 

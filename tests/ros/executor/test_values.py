@@ -2,6 +2,8 @@
 
 import csv
 import io
+import json
+import math
 import os
 import subprocess
 import sys
@@ -265,6 +267,44 @@ def test_a_mirror_of_an_own_struct(running: Any, graph: Any) -> None:
     graph.spin_until(lambda: graph.node.count_publishers(topic) == 0, "its end")
 
 
+def test_a_mirror_of_one_element_of_a_sequence(running: Any, graph: Any) -> None:
+    del running
+    heard = {}
+    for path in ("codes[1]", "codes.length", "corners[1].z", "rates[1]"):
+        done = graph.ask(Mirror, f"{NODE}/mirror", name="attitude", field=path, rate_hz=200.0)
+        assert (done.success, done.type) == (True, "std_msgs/msg/Float64"), done.message
+        heard[path] = next(graph.hear(Float64, topic) for topic in done.topics)
+    graph.spin_until(lambda: all(len(each) > 20 for each in heard.values()), "numbers")
+    lengths = {each.data for each in heard["codes.length"]}
+    assert lengths == {0.0, 1.0, 2.0}
+    elements = [each.data for each in heard["codes[1]"]]
+    assert any(math.isnan(each) for each in elements), "a shorter list has no such element"
+    assert any(not math.isnan(each) for each in elements)
+    assert all(each.data > 0 for each in heard["rates[1]"])
+
+
+def test_get_prints_a_property_or_a_field(mauve: Callable[..., Any], graph: Any) -> None:
+    graph.spin_until(lambda: ask(graph, "attitude")[0].writes > 0, "a value")
+    for name, printed in (
+        ("attitude.mode", "cruise"),
+        ("attitude.corners[1].y", "8.0"),
+        ("pilot.attitude.rates.length", "3"),
+        ("caller.period_ms", None),
+    ):
+        done = mauve("get", NODE, name)
+        assert (done.returncode, done.stderr) == (0, ""), name
+        assert printed is None or done.stdout == f"{printed}\n"
+    whole = json.loads(mauve("get", NODE, "place", "--json").stdout)
+    assert sorted(whole) == ["x", "y", "z"]
+    for name, problem in (
+        ("plase", "no property, resource or port is named 'plase'; did you mean place?"),
+        ("place.w", "no field 'w' in 'w'; expected one of x, y, z"),
+        ("scan", "scan (sensor_msgs/msg/LaserScan): nothing was written yet"),
+    ):
+        refused = mauve("get", NODE, name)
+        assert (refused.returncode, refused.stdout, refused.stderr) == (1, "", f"refused: {problem}\n")
+
+
 def test_a_mirror_ends_with_its_resource(running: Any, graph: Any) -> None:
     del running
     assert graph.ask(Mirror, f"{NODE}/mirror", name="scan").success
@@ -296,7 +336,9 @@ def _step(**fields: str) -> Any:
         ({"name": "place", "topic": "/robot_1/level"}, "topic /robot_1/level is bound already"),
         ({"name": "place", "topic": "/taken"}, "topic /taken has "),
         ({"name": "place", "topic": "no name"}, "topic 'no name': "),
-        ({"name": "scan", "field": "ranges[0]"}, "sensor_msgs/msg/LaserScan has no number 'ranges[0]'"),
+        ({"name": "scan", "field": "ranges"}, "sensor_msgs/msg/LaserScan has no number 'ranges'"),
+        ({"name": "scan", "field": "ranges[x]"}, "sensor_msgs/msg/LaserScan has no number 'ranges[x]'"),
+        ({"name": "words", "field": "data"}, "std_msgs/msg/String has no number 'data'; mauve echo shows"),
     ],
 )
 def test_mirrors_that_cannot_be(running: Any, graph: Any, request_: dict[str, Any], message: str) -> None:
