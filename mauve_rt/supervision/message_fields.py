@@ -48,12 +48,15 @@ def field_type(type_name: str, path: str) -> FieldType | None:
         fields: Mapping[str, str] = message.get_fields_and_field_types()
         if name not in fields:
             return FieldType(unknown=name, within=type_name, known=tuple(fields))
-        type_name = fields[name]
-        if index is not None:
-            element = _ELEMENT.fullmatch(type_name)
-            if element is None:
-                return FieldType(type=f"no list ({name} is {type_name})")
-            if element["size"] and index >= int(element["size"]):
-                return FieldType(type=f"no element {index} of {type_name}")
-            type_name = element["of"] or element["in_array"]
+        type_name = fields[name] if index is None else _element_type(fields[name], name, index)
     return FieldType(type=type_name)
+
+
+def _element_type(type_name: str, name: str, index: int) -> str:
+    """The type of one element; in words where the field has no such element."""
+    element = _ELEMENT.fullmatch(type_name)
+    if element is None:
+        return f"no list ({name} is {type_name})"
+    if element["size"] and index >= int(element["size"]):
+        return f"no element {index} of {type_name}"
+    return element["of"] or element["in_array"]

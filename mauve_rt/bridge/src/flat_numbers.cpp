@@ -136,7 +136,7 @@ bool FlatNumbers::find(const std::vector<FlatField>& fields, std::string_view pa
   path_.push_back(part);
   if (field->arity == FlatField::Arity::sequence && !part.element) return rest == "length";
   if ((field->arity == FlatField::Arity::one) == part.element.has_value()) return false;
-  if (field->arity == FlatField::Arity::fixed && *part.element >= field->size) return false;
+  if (field->arity == FlatField::Arity::fixed && part.element.value_or(0) >= field->size) return false;
   if (number_types().contains(field->type)) return end == path.size();
   return end < path.size() && find(field->fields, rest);
 }

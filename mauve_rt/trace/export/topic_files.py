@@ -22,9 +22,9 @@ def export_topics(trace: Trace, folder: Path, *, progress: Progress) -> list[str
     """Write `topic.NAME.csv` for each topic but the trace's own, `.` in the place of `/` in its name.
 
     A row is a message: its times (CLOCK_REALTIME, CLOCK_MONOTONIC), then a column for each field, as
-    `pose.position.x`. An array is one column with all elements, as `mauve_rt.fields.json_value` has them. Each
-    number of mauve_msgs/msg/Values has a column with its name, where the bag has the names. What is not valid
-    UTF-8 is escaped. Returns which topics are left out, as a message of theirs cannot be read.
+    `pose.position.x`. An array is one column with all elements, as `mauve_rt.fields.json_value` has them.
+    Each number of mauve_msgs/msg/Values has a column with its name, where the bag has the names. What is not
+    valid UTF-8 is escaped. Returns which topics are left out, as a message of theirs cannot be read.
     """
     if not _problem(trace, (), folder, progress):
         return []
