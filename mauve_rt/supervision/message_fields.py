@@ -30,18 +30,29 @@ class FieldType(NamedTuple):
 
 
 def field_type(type_name: str, path: str) -> FieldType | None:
-    """The type of a field; None when the message is not installed."""
+    """The type of a field, or in words why there is none; None when the message is not installed."""
     try:
         parts = split_path(path)
     except ValueError:
         return FieldType(unknown=path, within=type_name)
+    try:
+        return _field_type(type_name, parts)
+    except _NoField as error:
+        return FieldType(type=str(error))
+
+
+class _NoField(Exception):  # noqa: N818 - no error of this function
+    """A part of the path leads nowhere; in words."""
+
+
+def _field_type(type_name: str, parts: Sequence[tuple[str, int | None]]) -> FieldType | None:
     for name, index in parts:
-        element = _ELEMENT.fullmatch(type_name)
-        if element and name == LENGTH and index is None:
+        is_list = _ELEMENT.fullmatch(type_name) is not None
+        if is_list and name == LENGTH and index is None:
             type_name = "uint32"
             continue
-        if element or "/" not in type_name:
-            return FieldType(type=f"no message ({type_name})")
+        if is_list or "/" not in type_name:
+            raise _NoField(f"no message ({type_name})")
         message = message_class(re.sub(r"^(\w+)/(\w+)$", r"\1/msg/\2", type_name))
         if message is None:
             return None
@@ -53,10 +64,9 @@ def field_type(type_name: str, path: str) -> FieldType | None:
 
 
 def _element_type(type_name: str, name: str, index: int) -> str:
-    """The type of one element; in words where the field has no such element."""
     element = _ELEMENT.fullmatch(type_name)
     if element is None:
-        return f"no list ({name} is {type_name})"
+        raise _NoField(f"no list ({name} is {type_name})")
     if element["size"] and index >= int(element["size"]):
-        return f"no element {index} of {type_name}"
+        raise _NoField(f"no element {index} of {type_name}")
     return element["of"] or element["in_array"]

@@ -17,6 +17,7 @@ from mauve_rt.supervision.message_fields import FieldType, field_type
         ("sensor_msgs/msg/Imu", "orientation_covariance[8]", "double"),
         ("sensor_msgs/msg/Imu", "orientation_covariance[9]", "no element 9 of double[9]"),
         ("sensor_msgs/msg/Imu", "orientation.x[0]", "no list (x is double)"),
+        ("sensor_msgs/msg/Imu", "orientation[0].x", "no list (orientation is geometry_msgs/Quaternion)"),
         ("std_msgs/msg/String", "data.length", "no message (string)"),
     ],
 )
