@@ -235,6 +235,12 @@ def shown_json(capsys: pytest.CaptureFixture[str], name: str) -> dict[str, Any]:
     return dict(part)
 
 
+@pytest.mark.parametrize("value", ["-1e-3", "-1E3", "-.5", "-5", "-.inf", "1e-3", "text"])
+def test_a_negative_number_is_a_value_and_no_option(value: str) -> None:
+    args = build_parser().parse_args(["set", "/executor", "robot.start_x", value, "--timeout", "2"])
+    assert (args.value, args.timeout) == (value, 2.0)
+
+
 @pytest.mark.usefixtures("plugin_prefix")
 def test_an_fsm_has_its_methods_and_the_expressions_of_its_waits(capsys: pytest.CaptureFixture[str]) -> None:
     states = {state["name"]: state for state in shown_json(capsys, "executor_tests/TimedFsm")["states"]}
