@@ -23,7 +23,7 @@ from std_msgs.msg import Float64
 
 import mauve_rt.trace
 from mauve_msgs.msg import ReplyCode, Value, ValueNames, Values
-from mauve_msgs.srv import ListComponents, Mirror, ReadValues, Reconfigure, StartRecording
+from mauve_msgs.srv import ListComponents, ListRules, Mirror, ReadValues, Reconfigure, StartRecording
 from mauve_rt._kernel import Simulation
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import load_architecture
@@ -281,6 +281,29 @@ def test_a_mirror_of_one_element_of_a_sequence(running: Any, graph: Any) -> None
     assert any(math.isnan(each) for each in elements), "a shorter list has no such element"
     assert any(not math.isnan(each) for each in elements)
     assert all(each.data > 0 for each in heard["rates[1]"])
+
+
+def test_rules_of_the_executor_take_elements_of_bounded_lists(
+    start_executor: Callable[..., Any], tmp_path: Path, graph: Any
+) -> None:
+    (tmp_path / "robot.yaml").write_text(ARCHITECTURE, encoding="utf-8")
+    fields = {"length": "codes.length, above: 1.5", "beyond": "'codes[3]', above: 1000"}
+    rules = "".join(
+        f"  - {{name: {name}, when: {{value: {{resource: attitude, field: {field}}}}}, "
+        "do: [{kind: stop, target: caller}]}\n"
+        for name, field in fields.items()
+    )
+    (tmp_path / "rules.yaml").write_text(f"mauve: 1\nrules:\n{rules}", encoding="utf-8")
+    files = ("-p", f"architecture:={tmp_path / 'robot.yaml'}", "-p", f"rules:={tmp_path / 'rules.yaml'}")
+    start_executor(*files)
+
+    def held() -> set[str]:
+        found = graph.ask(ListRules, f"{NODE}/list_rules").rules
+        assert [each.problem for each in found] == [""] * 2
+        return {each.name for each in found if each.known and each.holds}
+
+    graph.spin_until(lambda: "length" in held(), "a list of two codes")
+    graph.spin_until(lambda: "beyond" in held(), "no number where the list has no fourth code")
 
 
 def test_get_prints_a_property_or_a_field(mauve: Callable[..., Any], graph: Any) -> None:
