@@ -44,6 +44,13 @@ def add_executor_and_json(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", action="store_true", help="print the reply as JSON")
 
 
+def take_negative_numbers(parser: argparse.ArgumentParser) -> None:
+    """Take `-1e-3` and `-.inf` for numbers, as argparse takes `-1`: Python 3.11 takes them for options."""
+    parser._negative_number_matcher = re.compile(  # noqa: SLF001 - argparse offers no other way
+        r"-(\d[\d_]*\.?\d*|\.\d+)([eE][-+]?\d+)?$|-\.(inf|Inf|INF)$"
+    )
+
+
 def add_value(parser: argparse.ArgumentParser, what: str, *, nargs: str | None = None) -> None:
     """The resource or port whose value a verb is about."""
     default = "" if nargs == "?" else None

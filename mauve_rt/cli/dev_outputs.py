@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from mauve_rt.trace.format.message_decoding import Decoder
-from mauve_rt.trace.format.message_fields import flat_fields
+from mauve_rt.trace.reading.value_tables import numbers_of
 
 MOST_OUTPUTS = 256
 """Values that the executor returns to one request."""
@@ -74,7 +74,7 @@ class OutputSamples:
                 continue
             kept = self._samples.setdefault(value.name, deque(maxlen=_KEPT))
             if not kept or kept[-1].time_ns != value.time_ns:
-                kept.append(Sample(value.time_ns, _numbers(decoder.decode(bytes(value.data)))))
+                kept.append(Sample(value.time_ns, numbers_of(decoder.decode(bytes(value.data)))))
         self.lacks_definitions = lacks
 
     def are_after(self, instants_ns: Mapping[str, int]) -> bool:
@@ -111,12 +111,3 @@ def number_text(value: float | None) -> str:
     if value is None:
         return "-"
     return f"{value:.6g}" if math.isfinite(value) else str(value)
-
-
-def _numbers(message: Any) -> dict[str, float]:
-    fields = flat_fields(message)
-    return {
-        name: float(each)
-        for name, each in fields
-        if isinstance(each, int | float) and not isinstance(each, bool)
-    }

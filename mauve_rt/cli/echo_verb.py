@@ -2,10 +2,10 @@
 
 import argparse
 import csv
+import json
 import sys
 import time
 from collections.abc import Iterator, Mapping
-from datetime import datetime
 from typing import Any, NamedTuple
 
 from mauve_rt.cli.arguments import add_executor, add_value, positive_rate
@@ -14,6 +14,7 @@ from mauve_rt.errors import MauveError
 
 _DEFAULT_HZ = 10.0
 _MOST_HZ = 200.0  # a poll takes a millisecond
+_MOST_ELEMENTS = 1000  # a list that people read; --csv has all of each
 _CSV_HEAD = ("time_ns", "monotonic_ns", "age_ns", "writes")
 
 
@@ -122,7 +123,7 @@ def polled(executor: str, name: str, *, rate_hz: float) -> Iterator[Sample]:
 
 def _fields(sample: Sample, field: str) -> Mapping[str, Any]:
     """What is shown of a sample, by name."""
-    from mauve_rt.trace.format.message_fields import field_at, flat_fields  # noqa: PLC0415
+    from mauve_rt.fields import field_at, flat_fields  # noqa: PLC0415
 
     if not field:
         return dict(flat_fields(sample.message))
@@ -140,6 +141,7 @@ class _Text:
         self._told_old = False
 
     def show(self, sample: Sample, before: Sample | None) -> None:
+        from mauve_rt.cli.views import clock_text  # noqa: PLC0415
         from mauve_rt.counts import duration  # noqa: PLC0415
 
         fields = _fields(sample, self._field)  # first: a bad --field is reported at once
@@ -151,13 +153,13 @@ class _Text:
             self._told_old = True
             return
         self._told_old = False
-        stamp = datetime.fromtimestamp(sample.stamp_ns / 1e9).astimezone()
         skipped = sample.skipped(before)
         between = f", {skipped} writes since the last poll are not shown" if skipped else ""
         age = "0 ns" if sample.age_ns == 0 else duration(sample.age_ns)
-        print(f"{stamp:%H:%M:%S.%f} new, age {age}, write {sample.writes}{between}")
+        print(f"{clock_text(sample.stamp_ns)} new, age {age}, write {sample.writes}{between}")
         for name, value in fields.items():
-            print(f"  {name}: {_text(value)}")
+            is_long = isinstance(value, list) and len(value) > _MOST_ELEMENTS
+            print(f"  {name}: {f'{len(value):,} elements' if is_long else value_text(value)}")
 
 
 class _Csv:
@@ -173,12 +175,14 @@ class _Csv:
         if not self._names:
             self._names = list(fields)
             self._writer.writerow([*_CSV_HEAD, *self._names])
-        values = [_text(fields.get(name, "")) for name in self._names]
+        values = [value_text(fields.get(name, "")) for name in self._names]
         self._writer.writerow([sample.stamp_ns, sample.monotonic_ns, sample.age_ns, sample.writes, *values])
 
 
-def _text(value: Any) -> str:
-    """Text of others without control characters; numbers as they are."""
+def value_text(value: Any) -> str:
+    """Text of others without control characters; numbers as they are, lists in JSON."""
+    if isinstance(value, list | dict | bool):
+        return json.dumps(value, ensure_ascii=False)
     if not isinstance(value, str):
         return str(value)
     return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in value)

@@ -1,6 +1,6 @@
 """What `mauve list` prints: what runs, which cores, what is connected; four tables that 80 columns hold."""
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from datetime import UTC, datetime
 from typing import Any
 
@@ -166,7 +166,7 @@ def _built(built_ns: int) -> str:
 def _connections(reply: Any) -> Table:
     """A line for each port; then the resources that none has but ROS."""
     table = _table("port", "connected to", "on ROS")
-    on_ros = {resource.name: _ros_names(resource) for resource in reply.resources}
+    resources = {resource.name: resource for resource in reply.resources}
     locked = {
         f"{resource.name}.{name}"
         for resource in reply.resources
@@ -174,7 +174,7 @@ def _connections(reply: Any) -> Table:
         for name in ("read", "write")
         if name not in resource.wait_free
     }
-    connected = set()
+    connected, shown = set(), set()
     for component in reply.components:
         for port in component.ports:
             service = f"{port.resource}.{port.service}" if port.resource else "[yellow]nothing[/]"
@@ -182,10 +182,14 @@ def _connections(reply: Any) -> Table:
                 service += " [dim](lock)[/]"
             if frames := frames_text(port):
                 service += f"\n[dim]{escape(frames)}[/]"
-            table.add_row(f"{component.name}.{port.name}", service, on_ros.get(port.resource, ""))
+            names = _ros_names(resources[port.resource], port) if port.resource in resources else []
+            table.add_row(f"{component.name}.{port.name}", service, "\n".join(names))
             connected.add(port.resource)
-    for name, names in _lonely(on_ros, connected).items():
-        table.add_row("[dim]-[/]", name, names)
+            shown |= {(port.resource, name) for name in names}
+    for name, resource in resources.items():
+        left = [line for line in _ros_names(resource) if (name, line) not in shown]
+        if left or name not in connected:
+            table.add_row("[dim]-[/]", name, "\n".join(left))
     return table
 
 
@@ -198,17 +202,18 @@ def _memory(reply: Any) -> Table:
     return table
 
 
-def _lonely(on_ros: Mapping[str, str], connected: set[str]) -> dict[str, str]:
-    return {name: names for name, names in on_ros.items() if name not in connected}
-
-
-def _ros_names(resource: Any) -> str:
-    names = [(side, getattr(resource, side)) for side in ROS_SIDES]
+def _ros_names(resource: Any, port: Any = None) -> list[str]:
+    """The lines for a resource's ROS names; with a port, those that the port has a part in."""
+    others = (
+        {} if port is None else {port.READ: "publishes", port.EVENT: "publishes", port.WRITE: "subscribes"}
+    )
+    not_its = others.get(port.kind) if port is not None else None
+    names = [(side, getattr(resource, side)) for side in ROS_SIDES if side != not_its]
     names += [("mirrors", topic) for topic in resource.mirrors]
     lines = [f"[dim]{side}[/] {name}" for side, name in names if name]
     if frames := frames_text(resource):
         lines.append(f"[dim]{escape(frames)}[/]")
-    return "\n".join(lines)
+    return lines
 
 
 def _table(*folding: str) -> Table:

@@ -13,6 +13,7 @@ from mauve_rt.cli import (
     doctor_verb,
     echo_verb,
     generate_verb,
+    get_verb,
     graph_verb,
     log_level_verb,
     mirror_verb,
@@ -29,7 +30,7 @@ from mauve_rt.cli import (
     types_verb,
     watch_verb,
 )
-from mauve_rt.cli.arguments import add_executor_and_json
+from mauve_rt.cli.arguments import add_executor_and_json, take_negative_numbers
 from mauve_rt.cli.bumpless import add_bumpless, bumpless_text
 from mauve_rt.cli.completion import (
     complete_components,
@@ -219,6 +220,7 @@ def _add_set(parser: argparse.ArgumentParser) -> None:
     name = parser.add_argument("property", type=_property, help="COMPONENT.PROPERTY, e.g. control.max_speed")
     completed_by(name, complete_properties)
     parser.add_argument("value", help="the new value, as in an architecture file")
+    take_negative_numbers(parser)
     add_request_fields(parser)
     _add_timeout(parser)
     _add_over_and_base(parser)
@@ -436,6 +438,7 @@ VERBS = (
         shadow_verb.main,
     ),
     Verb("set", "set a property of a component", _add_set, _set),
+    Verb("get", "print a property or a field of a resource", get_verb.add_arguments, get_verb.main),
     Verb("echo", "show the values of a resource or port", echo_verb.add_arguments, echo_verb.main),
     Verb(
         "log-level",

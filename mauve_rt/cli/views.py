@@ -1,15 +1,16 @@
 """What the verbs print: lines for people, JSON for programs."""
 
-import array
 import json
 import math
 import sys
 from collections.abc import Sequence
+from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from mauve_rt.cli.plain_output import beneath, plain
 from mauve_rt.cli.verb import OK, REFUSED
 from mauve_rt.counts import duration
+from mauve_rt.fields import json_value
 
 if TYPE_CHECKING:  # rich takes its time to load, and JSON or a line of text have no use for it
     from rich.console import Console
@@ -19,25 +20,10 @@ _WIDE = 160
 _WORTH_TELLING_NS = 1_000  # some steps prepare nothing
 
 
-def as_plain(message: Any) -> Any:
-    """A ROS message as values that JSON has."""
-    if hasattr(message, "get_fields_and_field_types"):
-        return {name: as_plain(getattr(message, name)) for name in message.get_fields_and_field_types()}
-    if isinstance(message, float) and not math.isfinite(message):
-        return None  # JSON has no word for it
-    if isinstance(message, bytes):
-        return list(message)
-    if isinstance(message, array.array) or hasattr(message, "tolist"):
-        return message.tolist()
-    if isinstance(message, Sequence) and not isinstance(message, str):
-        return [as_plain(item) for item in message]
-    return message
-
-
 def print_json(value: Any) -> None:
     """Indented JSON on stdout."""
-    text = json.dumps(as_plain(value), indent=2, ensure_ascii=False)
-    print(text if plain(text) == text else json.dumps(as_plain(value), indent=2))
+    text = json.dumps(json_value(value), indent=2, ensure_ascii=False)
+    print(text if plain(text) == text else json.dumps(json_value(value), indent=2))
 
 
 def console() -> "Console":
@@ -126,6 +112,12 @@ def _after(nanoseconds: int, event: str) -> str:
     return f"{duration(nanoseconds)} after {event}" if nanoseconds else f"at {event}"
 
 
+def clock_text(realtime_ns: int) -> str:
+    """An instant of CLOCK_REALTIME for people: local time, with ms."""
+    when = datetime.fromtimestamp(realtime_ns // 1_000_000_000).astimezone()
+    return f"{when:%H:%M:%S}.{realtime_ns // 1_000_000 % 1000:03d}"
+
+
 def event_line(event: Any) -> str:
     """One line about a ReconfigurationEvent."""
     outcome = (
@@ -133,5 +125,5 @@ def event_line(event: Any) -> str:
     )
     who = f" by {event.requested_by}" if event.requested_by else ""
     why = f" because {event.cause}" if event.cause else ""
-    stamp = f"{event.stamp.sec}.{event.stamp.nanosec // 1_000_000:03d}"
+    stamp = clock_text(event.stamp.sec * 1_000_000_000 + event.stamp.nanosec)
     return f"{stamp} {event.request}{who}{why}: {outcome}"

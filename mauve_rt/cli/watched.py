@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from mauve_msgs.msg import BoundViolation, ReconfigurationEvent
 from mauve_msgs.srv import ListComponents, ListRules, ReadValues
 from mauve_rt.cli.client import Client
+from mauve_rt.fields import field_at, flat_fields
 from mauve_rt.trace.format.message_decoding import Decoder
-from mauve_rt.trace.format.message_fields import field_at, flat_fields
 
 LIST_S, VALUES_S = 1.0, 0.5
 """Between two requests."""

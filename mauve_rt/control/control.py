@@ -37,7 +37,7 @@ from mauve_rt.control.requests import (
 )
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.steps import Bound, Plan
-from mauve_rt.control.wishes import step_of, wanted
+from mauve_rt.control.wishes import step_of, wanted, with_declared_values
 from mauve_rt.errors import MauveError, error_code, internal_error_text, one_line
 from mauve_rt.model.schema import ResourceModel
 
@@ -244,6 +244,7 @@ class Control:
         try:
             self._limits.check_size(request)
             check_form(request)
+            request = with_declared_values(request, parts)
             if request.recording is not None:
                 outcome = self._order(request, request.recording)
             elif request.reload is not None:

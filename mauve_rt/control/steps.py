@@ -35,6 +35,7 @@ from mauve_rt.model.architecture_file import ArchitectureModel
 from mauve_rt.model.build import add_component_step, add_resource_step, allowed_parts
 from mauve_rt.model.bumpless import read_bumpless
 from mauve_rt.model.checks import Checks, property_mismatch
+from mauve_rt.model.declared_values import read_declared
 from mauve_rt.model.fragment import fragment
 from mauve_rt.model.message_shapes import REMEDY, mismatches
 from mauve_rt.model.plugins import SOURCE_IT, PluginLoader
@@ -311,9 +312,10 @@ def _words(error: MauveError) -> str:
     return str(error)
 
 
-def _yaml(step: Step, subject: str) -> object:
+def _yaml(step: Step, subject: str, type_name: str = "") -> object:
+    """The value of a step; of the declared type, if one is named."""
     try:
-        return read_yaml(step.value)
+        return read_declared(step.value, type_name) if type_name else read_yaml(step.value)
     except YamlError:
         raise RefusalError(Code.INVALID, f"{subject}: the value {shown(step.value)} is not YAML") from None
 
@@ -361,8 +363,8 @@ def _service(step: Step) -> str:
     return f"{resource}.{service}"
 
 
-def _scalar(step: Step, subject: str) -> PropertyValue:
-    value = _yaml(step, subject)
+def _scalar(step: Step, subject: str, type_name: str = "") -> PropertyValue:
+    value = _yaml(step, subject, type_name)
     if not isinstance(value, bool | int | float | str):
         expected = "expected true, false, a number or text in YAML"
         raise RefusalError(Code.INVALID, f"{subject}: {expected}, found {shown(step.value)}")
@@ -375,7 +377,7 @@ def _property_value(step: Step, component: _Sketch) -> PropertyValue:
     if step.name not in known:
         text = f"component '{step.target}' has no property {shown(step.name)}"
         raise RefusalError(Code.INVALID, f"{text}; {did_you_mean(step.name, known)}")
-    value = _scalar(step, subject)
+    value = _scalar(step, subject, known[step.name].type)
     if facts := property_mismatch(known[step.name], value):
         text = f"{subject}: expected {facts['expected']}, found {facts['found']}"
         raise RefusalError(Code.INVALID, text)

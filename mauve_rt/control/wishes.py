@@ -1,13 +1,14 @@
 """What rules and persons want, as requests see it: what they may set, and what it comes to. No ROS."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
-from mauve_rt._kernel import ActionStep, Overlay, Overlays, OverlaySpec
+from mauve_rt._kernel import ActionStep, ComponentDescription, Overlay, Overlays, OverlaySpec
 from mauve_rt.control.requests import OVER_RULES, Code, RefusalError, Request
 from mauve_rt.control.runtime import Runtime
+from mauve_rt.model.declared_values import read_declared
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.step_kinds import STEP_KINDS
 from mauve_rt.model.steps import Step
@@ -49,6 +50,28 @@ def assignment_of(step: Step) -> ActionStep:
             read = step.value
         value = read if isinstance(read, bool | int | float | str) else step.value
     return ActionStep(step.kind, step.target, step.name, value)
+
+
+def with_declared_values(request: Request, parts: Iterable[ComponentDescription]) -> Request:
+    """The request with the values of its properties in the types that the present components declare."""
+    types = {(part.name, item.name): item.type for part in parts for item in part.properties}
+    steps = tuple(
+        _with_declared_value(step, types.get((step.target, step.name), "")) for step in request.steps
+    )
+    return replace(request, steps=steps)
+
+
+def _with_declared_value(step: Step, type_name: str) -> Step:
+    if step.kind != "set_property" or not type_name:
+        return step
+    try:
+        read, declared = read_yaml(step.value), read_declared(step.value, type_name)
+    except YamlError:
+        return step  # the plan refuses it
+    if type(read) is type(declared):
+        return step
+    text = read.strip() if isinstance(read, str) else json.dumps(declared, ensure_ascii=False)
+    return replace(step, value=text)
 
 
 def step_of(assignment: ActionStep, known: Sequence[Step] = ()) -> Step:

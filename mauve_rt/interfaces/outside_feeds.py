@@ -5,8 +5,8 @@ from functools import partial
 from typing import Any, Literal, Protocol
 
 from mauve_rt._kernel import SignalSpec
+from mauve_rt.fields import number_at
 from mauve_rt.interfaces.decisions import STATES
-from mauve_rt.supervision.message_fields import field_value
 from mauve_rt.supervision.peers import PEER_STATES, Peer, PeerState, executor_name
 from mauve_rt.supervision.remote_rules import RemoteRules
 from mauve_rt.supervision.rule_types import heard_type
@@ -104,7 +104,7 @@ class OutsideFeeds:
             self._tell_peer(name)
 
     def _hear(self, number: int, field: str, message: Any) -> None:
-        value = field_value(message, field) if field else 0.0
+        value = number_at(message, field) if field else 0.0
         self._rules.hear(number, self._now_ns(), value)
 
     def _hear_state(self, name: str, state: Any) -> None:

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from mauve_rt._kernel import SignalSpec
+from mauve_rt.fields import number_at
 from mauve_rt.model.step_kinds import STEP_KINDS
-from mauve_rt.supervision.message_fields import field_value
 from mauve_rt.supervision.rules import Rule
 from mauve_rt.supervision.view_signals import COMPONENT_STATES
 from mauve_rt.supervision.when import When
@@ -184,6 +184,6 @@ def _values(message: Message, signal: SignalSpec) -> Iterator[float]:
     if signal.kind in ("message", "arrival"):
         yield 0.0
     elif signal.kind == "field":
-        yield field_value(message.msg, signal.detail)
+        yield number_at(message.msg, signal.detail)
     else:
-        yield from (field_value(one, "level") for one in message.msg.status if one.name == signal.target)
+        yield from (number_at(one, "level") for one in message.msg.status if one.name == signal.target)

@@ -15,6 +15,7 @@ from yaml.events import (
     DocumentStartEvent,
     MappingEndEvent,
     MappingStartEvent,
+    NodeEvent,
     ScalarEvent,
     SequenceEndEvent,
     SequenceStartEvent,
@@ -99,6 +100,18 @@ def parse_yaml(text: str, *, max_bytes: int = MAX_BYTES) -> Node:
         raise _syntax_error(_in_pythons_words(text, error)) from None
     except yaml.YAMLError as error:
         raise YamlError(f"not YAML: {str(error).splitlines()[0]}") from None
+
+
+def plain_scalar(text: str) -> str | None:
+    """The text of a document that is one scalar without quotes and tag; None: it is another one.
+
+    Raises:
+        YamlError: as read_yaml().
+    """
+    read_yaml(text)
+    events = [event for event in _events(text) if isinstance(event, NodeEvent)]
+    is_plain = len(events) == 1 and isinstance(events[0], ScalarEvent) and events[0].implicit[0]
+    return str(events[0].value) if is_plain else None
 
 
 def _events(text: str) -> Iterator[Any]:

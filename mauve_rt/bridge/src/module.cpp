@@ -49,10 +49,11 @@ FlatField flat_field(const py::tuple& told) {
   return field;
 }
 
-FlatNumbers flat_numbers(const Typed<"typing.Sequence[tuple[str, str, str, int, typing.Any]]">& fields) {
+FlatNumbers flat_numbers(const Typed<"typing.Sequence[tuple[str, str, str, int, typing.Any]]">& fields,
+                         const std::string& path) {
   std::vector<FlatField> all;
   for (const py::handle field : fields) all.push_back(flat_field(field.cast<py::tuple>()));
-  return FlatNumbers(std::move(all));
+  return path.empty() ? FlatNumbers(std::move(all)) : FlatNumbers(std::move(all), path);
 }
 
 std::size_t open_mirror(Bridge& self, const std::string& resource, const std::string& topic,
@@ -329,8 +330,10 @@ As rclpy's QoSPolicyKind; 0: none.)");
   py::class_<FlatNumbers>(
       module, "FlatNumbers",
       "Reads the numbers of messages of one type; a sequence has one number, its length; a text has none.")
-      .def(py::init(&flat_numbers), py::arg("fields"),
+      .def(py::init(&flat_numbers), py::arg("fields"), py::arg("path") = "",
            R"(Fields: (name, type as in .msg files, "" or "fixed" or "sequence", size, fields of a message).
+
+With a path such as position.x or ranges[3], the one number there.
 
 Raises:
     MauveError: there is no number, or more than 1,000, or a field cannot be read.)")

@@ -77,7 +77,7 @@ OutputSteps::OutputSteps(const Shell& shell, const std::string& component,
     const std::optional<NumberPlace> place = port.find_number(output.field);
     if (!place)
       refuse("the output has no number there that can be read in real time",
-             "a field of " + port.type() + " that is a number, not in a text or a list whose length changes",
+             "a field of " + port.type() + " that is a number, not in a text or a list without a bound",
              output.field.empty() ? "no field" : output.field, "name the field of a number");
     const auto& ports = shell.ports();
     const auto its =

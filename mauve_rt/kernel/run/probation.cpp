@@ -136,8 +136,8 @@ void Probation::add(const OutputLimit& limit) {
     const std::optional<NumberPlace> place = port.find_number(path);
     if (!place.has_value()) {
       refuse("the output has no number there that can be read in real time",
-             "a field of " + port.type() + " that is a number, not in a text or a list whose length changes",
-             path, "name the field of a number");
+             "a field of " + port.type() + " that is a number, not in a text or a list without a bound", path,
+             "name the field of a number");
     }
     constexpr double kInfinite = std::numeric_limits<double>::infinity();
     own.limits.push_back({.path = path,

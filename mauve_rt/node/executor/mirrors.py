@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Iterable
+from contextlib import suppress
 
 from rclpy.exceptions import NameValidationException
 from rclpy.lifecycle import LifecycleNode
 from rclpy.validate_topic_name import validate_topic_name
 
 from mauve_rt._bridge import FlatNumbers
+from mauve_rt._kernel import ResourceDescription
 from mauve_rt.control.values import Values, read_shapes
 from mauve_rt.errors import MauveError, one_line
 from mauve_rt.file_schema.words import did_you_mean
@@ -59,9 +61,7 @@ class Mirrors:
         is_message = message_class(resource.type) is not None
         numbers = None
         if field or not is_message:
-            numbers = FlatNumbers(flat_fields(resource.type, read_shapes(resource)))
-        if field and numbers is not None and field not in numbers.names:
-            raise MauveError(f"{resource.type} has no number '{field}'; {did_you_mean(field, numbers.names)}")
+            numbers = _numbers(resource, field)
         mirrored = Mirrored(
             name=name,
             field=field,
@@ -70,8 +70,7 @@ class Mirrors:
             type=_NUMBER if field else resource.type if is_message else _NUMBERS,
             rate_hz=rate_hz,
         )
-        number = numbers.names.index(field) if field and numbers is not None else None
-        self._bound.mirror(mirrored, numbers=numbers, number=number)
+        self._bound.mirror(mirrored, numbers=numbers, number=0 if field else None)
         return mirrored
 
     def end(self, name: str, topic: str) -> list[Mirrored]:
@@ -97,6 +96,21 @@ class Mirrors:
             return str(self._node.resolve_topic_name(topic))
         except NameValidationException as error:
             raise MauveError(f"topic '{topic}': {one_line(str(error))}") from error
+
+
+def _numbers(resource: ResourceDescription, field: str) -> FlatNumbers:
+    """All numbers of a value, or the one at a path."""
+    fields = flat_fields(resource.type, read_shapes(resource))
+    try:
+        return FlatNumbers(fields, field)
+    except MauveError:
+        if not field:
+            raise
+        names = []
+        with suppress(MauveError):  # too many or none of them
+            names = FlatNumbers(fields).names
+        remedy = did_you_mean(field, names) if names else "mauve echo shows its fields"
+        raise MauveError(f"{resource.type} has no number '{field}'; {remedy}") from None
 
 
 def topics(mirrored: Mirrored) -> list[str]:

@@ -24,10 +24,14 @@ from rclpy.qos import qos_profile_parameters
 
 from mauve_rt.control.requests import Outcome, Request
 from mauve_rt.file_schema.words import did_you_mean, shown
+from mauve_rt.model.declared_values import declared_value
 from mauve_rt.model.schema import PropertyValue
 from mauve_rt.model.steps import Step
-from mauve_rt.node.executor.parameters import Parameters
+from mauve_rt.node.executor.parameters import PROPERTY_TYPES, Parameters
 from mauve_rt.node.shared.settings import QOS_OVERRIDES, no_qos_overrides
+
+_ARRAYS = [kind for kind in Parameter.Type if kind.name.endswith("_ARRAY")]
+_TYPE_NAMES = {kind: name for name, kind in PROPERTY_TYPES.items()}
 
 
 class ParameterServices:
@@ -102,7 +106,7 @@ class ParameterServices:
     def _carry_out(self, messages: Sequence[Any]) -> SetParametersResult:
         """All or none of them."""
         try:
-            parameters = [Parameter.from_parameter_msg(message) for message in messages]
+            parameters = [self._declared(Parameter.from_parameter_msg(message)) for message in messages]
         except (ValueError, TypeError) as error:
             return _refused(f"no value of a parameter: {error}")
         of_components = [parameter for parameter in parameters if _is_property(parameter.name)]
@@ -118,6 +122,29 @@ class ParameterServices:
         names = ", ".join(parameter.name for parameter in parameters)
         outcome = self._handle(Request(steps=steps, cause=f"parameters set: {names[:900]}"))
         return SetParametersResult(successful=True) if outcome.success else _refused(outcome.message)
+
+    def _declared(self, parameter: Parameter) -> Parameter:
+        """The parameter in its declared type: ros2cli sends the type that a value's text looks like.
+
+        Raises:
+            ValueError: text is declared, and what the text was is not known any longer.
+        """
+        with self._lock:
+            if not self._node.has_parameter(parameter.name):
+                return parameter
+            declared = Parameter.Type(self._node.get_parameter_type(parameter.name))
+        value, name = parameter.value, parameter.name
+        if parameter.type_ in _ARRAYS and len(value) == 0 and declared in _ARRAYS:
+            return Parameter(name, declared, [])
+        if declared == Parameter.Type.STRING and isinstance(value, bool | int | float):
+            raise ValueError(
+                f"{shown(name)}: expected text, found {shown(value)}, as ros2 reads some text. "
+                "Put the text in quotes of its own, as in \"'007'\""
+            )
+        value = declared_value(value, _TYPE_NAMES.get(declared, "str"))
+        if declared == Parameter.Type.DOUBLE and type(value) is int:
+            value = float(value)
+        return parameter if value is parameter.value else Parameter(name, declared, value)
 
     def _set_own(self, parameters: Sequence[Parameter]) -> SetParametersResult:
         with self._lock:

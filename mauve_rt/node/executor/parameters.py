@@ -11,12 +11,13 @@ from rclpy.parameter import Parameter
 from mauve_rt._kernel import PropertyDescription
 from mauve_rt.control.runtime import Runtime
 
-_TYPES = {
+PROPERTY_TYPES = {
     "bool": Parameter.Type.BOOL,
     "int": Parameter.Type.INTEGER,
     "float": Parameter.Type.DOUBLE,
     "str": Parameter.Type.STRING,
 }
+"""Types of properties as ROS has them."""
 _Present = dict[str, tuple[PropertyDescription, ParameterDescriptor]]
 _INT64 = (-(2**63), 2**63 - 1)
 _PROTECTED = "protected (reconfigurable: false): to be set by the architecture file or at the start"
@@ -55,7 +56,7 @@ class Parameters:
                 if name not in self._declared:
                     self._declare(name, item, descriptor)
                 elif self._differs(name, item):
-                    changed.append(Parameter(name, _TYPES[item.type], item.value))
+                    changed.append(Parameter(name, PROPERTY_TYPES[item.type], item.value))
             if changed:
                 self._node.set_parameters_atomically(changed)
 
@@ -88,7 +89,7 @@ def _descriptor(item: PropertyDescription, *, is_protected: bool) -> ParameterDe
     parts = " and ".join(f"the {part}" for part in item.structural)
     constraint = _STRUCTURAL.format(parts, parts) if parts else ""
     descriptor = ParameterDescriptor(
-        type=_TYPES[item.type].value,
+        type=PROPERTY_TYPES[item.type].value,
         description=" ".join(word for word in (item.description, unit) if word),
         additional_constraints=_PROTECTED if is_protected else constraint,
         read_only=is_protected or bool(parts),

@@ -42,13 +42,13 @@ class FieldFeed final : public Feed, private EventListener {
   void listen(std::shared_ptr<Resource> resource) {
     const std::optional<NumberPlace> found = resource->find_number(path_);
     if (!found) {
-      throw Error(
-          ErrorCode::invalid_argument, "the resource has no number there that can be read in real time",
-          {.element = "resource " + name_,
-           .expected = "a field that is a number, bool included, of " + resource->type() +
-                       ", not in a text or a list whose length changes, of shared_data or latest_value",
-           .found = path_,
-           .remedy = "name a number's field, or ask for it in: supervisor"});
+      throw Error(ErrorCode::invalid_argument,
+                  "the resource has no number there that can be read in real time",
+                  {.element = "resource " + name_,
+                   .expected = "a field that is a number, bool included, of " + resource->type() +
+                               ", not in a text or a list without a bound, of shared_data or latest_value",
+                   .found = path_,
+                   .remedy = "name a number's field, or ask for it in: supervisor"});
     }
     place_ = *found;
     resource_ = std::move(resource);

@@ -1,13 +1,14 @@
 """The messages of a bag's topics as CSV files, one for each topic."""
 
 import csv
+import json
 import re
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
+from mauve_rt.fields import flat_fields
 from mauve_rt.trace.errors import TraceError
-from mauve_rt.trace.format.message_fields import flat_fields
 from mauve_rt.trace.progress import Progress
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.trace import Trace
@@ -21,9 +22,9 @@ def export_topics(trace: Trace, folder: Path, *, progress: Progress) -> list[str
     """Write `topic.NAME.csv` for each topic but the trace's own, `.` in the place of `/` in its name.
 
     A row is a message: its times (CLOCK_REALTIME, CLOCK_MONOTONIC), then a column for each field, as
-    `pose.position.x`. An array is one column, in JSON. Each number of mauve_msgs/msg/Values has a column with
-    its name, where the bag has the names. What is not valid UTF-8 is escaped. Returns which topics are left
-    out, as a message of theirs cannot be read.
+    `pose.position.x`. An array is one column with all elements, as `mauve_rt.fields.json_value` has them.
+    Each number of mauve_msgs/msg/Values has a column with its name, where the bag has the names. What is not
+    valid UTF-8 is escaped. Returns which topics are left out, as a message of theirs cannot be read.
     """
     if not _problem(trace, (), folder, progress):
         return []
@@ -62,7 +63,7 @@ def _write(trace: Trace, topics: tuple[str, ...], folder: Path, progress: Progre
 
 
 def _row(message: Any, names: list[str]) -> dict[str, Any]:
-    row = dict(flat_fields(message))
+    row = {name: json.dumps(each) if isinstance(each, list) else each for name, each in flat_fields(message)}
     if names and len(names) == len(message.values):
         del row["values"]
         row |= zip(names, message.values.tolist(), strict=True)

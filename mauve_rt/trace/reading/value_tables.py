@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 Floats = npt.NDArray[np.float64]
 Times = npt.NDArray[np.int64]
 
+MOST_ELEMENTS = 16
+"""Of an array whose elements are values; a longer one, as a laser scan, is left out."""
 _FEWEST_TOGETHER = 8  # fewer messages of one size are read one by one
 _MOST_LAYOUTS = 4  # of messages of one size
 _Getter = Callable[[Any], Any]
@@ -152,6 +154,13 @@ def _tables_of_bytes(
             progress(min(done / total, 1.0), "reading values")
         if is_whole:
             return tables
+
+
+def numbers_of(message: Any, most_elements: int = MOST_ELEMENTS) -> dict[str, float]:
+    """Each number of a message by its path, as a table has them: no time stamps, no longer arrays."""
+    return {
+        name: _number(get, message) for name, get in _numbers("", message, lambda msg: msg, most_elements)
+    }
 
 
 def _number(get: _Getter, message: Any) -> float:

@@ -17,15 +17,13 @@ from mauve_rt.trace.progress import Progress, silent
 from mauve_rt.trace.reading.decisions import DECISION_TYPE
 from mauve_rt.trace.reading.facts import OWN_TYPES
 from mauve_rt.trace.reading.shadows import SHADOW_TYPE
-from mauve_rt.trace.reading.value_tables import Floats, tables_of
+from mauve_rt.trace.reading.value_tables import MOST_ELEMENTS, Floats, tables_of
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from mauve_rt.trace.reading.trace import Trace
 
-MOST_ELEMENTS = 16
-"""Of an array whose elements are values; a longer one, as a laser scan, is left out."""
 VALUES_TYPE, NAMES_TYPE = "mauve_msgs/msg/Values", "mauve_msgs/msg/ValueNames"
 NO_VALUES = (
     *OWN_TYPES,

@@ -1,5 +1,6 @@
 """Values around a reconfiguration: before, during and after it, as curves and in words."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,7 +87,12 @@ def values_around_swap(analysis: Analysis, one: Reconfiguration) -> tuple[str, s
     parts = [
         axis(window, one, height - 22),
         svg.rect(window.x(one.parked_ns) - 1, _TOP, band, height - _TOP - 22, css="blackout"),
-        *(_row(value, window, _TOP + index * _ROW) for index, value in enumerate(found)),
+        *(
+            _row(value, name, window, _TOP + index * _ROW)
+            for index, (value, name) in enumerate(
+                zip(found, _shortened([one.name for one in found]), strict=True)
+            )
+        ),
     ]
     described = f"values around the reconfiguration of {one.component}"
     figure = svg.svg(WIDTH, height, "".join(parts), css="swap-values", described=described)
@@ -119,13 +125,11 @@ def _ends(values: Floats) -> tuple[float, float]:
     return float(values.min()), float(values.max())
 
 
-def _row(value: SwapValue, window: Window, top: float) -> str:
+def _row(value: SwapValue, name: str, window: Window, top: float) -> str:
     base = top + _ROW - 1
     parts = [
         svg.line(LEFT, base, WIDTH - RIGHT, base, css="row-line"),
-        svg.label(
-            LEFT - 10, top + _ROW / 2 + 4, _shortened(value.name), css="name", anchor="end", tip=value.words()
-        ),
+        svg.label(LEFT - 10, top + _ROW / 2 + 4, name, css="name", anchor="end", tip=value.words()),
     ]
     entries = _entries_within(value.samples, window)
     if len(entries):
@@ -137,11 +141,22 @@ def _row(value: SwapValue, window: Window, top: float) -> str:
     return "".join(parts)
 
 
-def _shortened(name: str) -> str:
-    """The name, or its begin and its end, which tells the field."""
+def _shortened(names: Sequence[str]) -> list[str]:
+    """The names, or the begin and end of each, cut where all stay different; else with numbers."""
+    room = _CHARACTERS - 1
+    heads = sorted(range(room), key=lambda head: abs(head - room // 2))
+    for head in heads:
+        found = [_cut(name, head) for name in names]
+        if len({*found}) == len({*names}):
+            return found
+    return [f"{number}: {_cut(name, room // 2)}" for number, name in enumerate(names, start=1)]
+
+
+def _cut(name: str, head: int) -> str:
+    """The first `head` characters and the last ones of a long name."""
     if len(name) <= _CHARACTERS:
         return name
-    return f"{name[: _CHARACTERS // 2 - 1]}\N{HORIZONTAL ELLIPSIS}{name[-_CHARACTERS // 2 :]}"
+    return f"{name[:head]}\N{HORIZONTAL ELLIPSIS}{name[head + 1 - _CHARACTERS :]}"
 
 
 def _entries_within(samples: Samples, window: Window) -> Array:

@@ -14,6 +14,7 @@ struct Outer {
   std::array<Inner, 3> list{};
   float cost_m{};
   BoundedVector<double, 4> varying{};
+  BoundedVector<Inner, 2> inners{};
   BoundedString<8> text{};
 };
 struct Large {
@@ -24,7 +25,7 @@ struct Large {
 
 MAUVE_TYPE(mauve::testing::test_number_place::Inner, "test_msgs/msg/Inner", x, on)
 MAUVE_TYPE(mauve::testing::test_number_place::Outer, "test_msgs/msg/Outer", first, inner, list, cost_m,
-           varying, text)
+           varying, inners, text)
 MAUVE_TYPE(mauve::testing::test_number_place::Large, "test_msgs/msg/Large", values)
 
 namespace mauve::testing::test_number_place {
@@ -51,10 +52,38 @@ TEST(NumberPlace, IsFoundByItsPath) {
   EXPECT_EQ(0.25, read(resource, "cost")) << "the message's name of it";
 }
 
+TEST(NumberPlace, IsNaNBeyondTheLengthOfABoundedList) {
+  SharedData<Outer> resource;
+  Outer value;
+  ASSERT_TRUE(value.varying.push_back(1.5) && value.varying.push_back(-2.5));
+  ASSERT_TRUE(value.inners.push_back({.x = 3.5, .on = true}));
+  resource.write.write(value, 1);
+  EXPECT_EQ(-2.5, read(resource, "varying[1]"));
+  EXPECT_TRUE(std::isnan(read(resource, "varying[2]")));
+  EXPECT_TRUE(std::isnan(read(resource, "varying[3]")));
+  EXPECT_EQ(2, read(resource, "varying.length"));
+  EXPECT_EQ(3.5, read(resource, "inners[0].x"));
+  EXPECT_EQ(1, read(resource, "inners[0].on"));
+  EXPECT_TRUE(std::isnan(read(resource, "inners[1].x")));
+  EXPECT_FALSE(value.varying.resize(5));
+  ASSERT_TRUE(value.varying.resize(1));
+  resource.write.write(value, 2);
+  EXPECT_TRUE(std::isnan(read(resource, "varying[1]"))) << "the list is shorter now";
+}
+
+TEST(NumberPlace, OfAListIsNotWritten) {
+  SharedData<Outer> resource;
+  for (const char* path : {"varying[0]", "varying.length", "inners[1].x", "inner.on"}) {
+    const std::optional<NumberPlace> place = resource.find_number(path);
+    EXPECT_TRUE(place && place->store == nullptr) << path;
+  }
+}
+
 TEST(NumberPlace, IsNoneAtNoFixedPlace) {
   SharedData<Outer> resource;
   for (const char* path : {"", ".", "inner", "inner.y", "list", "list[3].x", "list[-1].x", "list[1x].x",
-                           "list[0]", "varying", "varying[0]", "text", "first.x", "inner.x[0]"})
+                           "list[0]", "varying", "varying[4]", "varying[0].x", "inners[0]", "inners.length.x",
+                           "text", "text.length", "first.x", "inner.x[0]"})
     EXPECT_FALSE(resource.find_number(path)) << path;
 }
 

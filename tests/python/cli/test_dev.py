@@ -480,6 +480,23 @@ def test_the_step_is_between_the_last_value_before_and_the_first_since() -> None
     assert samples.steps({}) == []
 
 
+def test_an_element_of_an_array_has_a_step_too() -> None:
+    import struct  # noqa: PLC0415
+
+    samples = OutputSamples()
+    for time_ns, first in ((10, 1.0), (20, 3.0)):
+        data = b"\0\1\0\0" + struct.pack("<ddI4xd", first, 5.0, 1, first * 2)
+        definition = "float64[2] torque\nfloat64[] gains\n"
+        facts = {"name": "a.out", "type": "t/msg/Torques", "status": Value.WRITTEN}
+        samples.take([Value(**facts, data=list(data), definition=definition, time_ns=time_ns, writes=1)])
+    steps = {step.name: (step.before, step.after) for step in samples.steps({"a": 20})}
+    assert steps == {
+        "a.out:torque[0]": (1.0, 3.0),
+        "a.out:torque[1]": (5.0, 5.0),
+        "a.out:gains[0]": (2.0, 6.0),
+    }
+
+
 # The screen
 
 

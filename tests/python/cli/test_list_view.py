@@ -96,6 +96,26 @@ def test_each_port_says_what_it_is_connected_to_and_where_that_goes() -> None:
     assert _line(lines, "idle") == ["-", "idle"]
 
 
+def test_a_port_shows_only_the_topics_of_its_own_direction() -> None:
+    ports = [
+        PortInfo(name="seen", kind=PortInfo.READ, resource="pose", service="read"),
+        PortInfo(name="pose", kind=PortInfo.WRITE, resource="pose", service="write"),
+        PortInfo(name="lone", kind=PortInfo.READ, resource="alarm", service="read"),
+    ]
+    resources = [
+        ResourceInfo(name="pose", publishes="/pose", subscribes="/seen"),
+        ResourceInfo(name="alarm", publishes="/alarm"),
+    ]
+    reply = ListComponents.Response(
+        components=[ComponentInfo(name="control", ports=ports)], resources=resources
+    )
+    lines = _printed(reply)
+    assert _line(lines, "control.seen") == ["control.seen", "pose.read", "subscribes", "/seen"]
+    assert _line(lines, "control.pose") == ["control.pose", "pose.write", "publishes", "/pose"]
+    assert _line(lines, "control.lone") == ["control.lone", "alarm.read"]
+    assert _line(lines, "/alarm") == ["-", "alarm", "publishes", "/alarm"]
+
+
 def test_a_port_that_takes_a_lock_is_marked() -> None:
     ports = [
         PortInfo(name="pose", kind=PortInfo.READ, resource="pose", service="read"),

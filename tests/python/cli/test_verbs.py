@@ -13,6 +13,7 @@ from mauve_rt.cli import views
 from mauve_rt.cli.main import build_parser, main
 from mauve_rt.counts import duration
 from mauve_rt.errors import ArchitectureFileError
+from mauve_rt.fields import json_value
 from mauve_rt.model.steps import load_change
 
 
@@ -172,7 +173,10 @@ def test_reports_and_events_in_words() -> None:
     assert views.report_lines(two) == ["guidance: stop", line]
     event = ReconfigurationEvent(request="stop guidance", requested_by="me", code=4, message="is stopped")
     event.stamp.sec = 12
-    assert views.event_line(event) == "12.000 stop guidance by me: refused (4): is stopped"
+    assert (
+        views.event_line(event)
+        == f"{views.clock_text(12 * 10**9)} stop guidance by me: refused (4): is stopped"
+    )
 
 
 @pytest.mark.parametrize(
@@ -184,7 +188,7 @@ def test_durations(nanoseconds: int, text: str) -> None:
 
 
 def test_messages_as_json() -> None:
-    plain: dict[str, Any] = views.as_plain(ComponentInfo(name="a", cpus=[1, 2]))
+    plain: dict[str, Any] = json_value(ComponentInfo(name="a", cpus=[1, 2]))
     assert (plain["name"], plain["cpus"], plain["ports"]) == ("a", [1, 2], [])
     assert json.loads(json.dumps(plain)) == plain
 
@@ -229,6 +233,12 @@ def shown_json(capsys: pytest.CaptureFixture[str], name: str) -> dict[str, Any]:
     assert main(["plugins", name, "--json"]) == 0
     [part] = json.loads(capsys.readouterr().out)
     return dict(part)
+
+
+@pytest.mark.parametrize("value", ["-1e-3", "-1E3", "-.5", "-5", "-.inf", "1e-3", "text"])
+def test_a_negative_number_is_a_value_and_no_option(value: str) -> None:
+    args = build_parser().parse_args(["set", "/executor", "robot.start_x", value, "--timeout", "2"])
+    assert (args.value, args.timeout) == (value, 2.0)
 
 
 @pytest.mark.usefixtures("plugin_prefix")

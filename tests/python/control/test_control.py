@@ -112,6 +112,24 @@ class _Spy:
         return self._deployer.make(transaction, **options)
 
 
+@pytest.mark.parametrize(
+    ("name", "text", "value"),
+    [
+        *(("label", text, text) for text in ("007", "1e3", "true", "null", "0x10")),
+        ("label", "'007'", "007"),
+        ("step", '"5e-06"', 5e-06),
+        ("step", "1e-3", 1e-3),
+    ],
+)
+def test_a_property_is_set_by_its_declared_type(
+    runtime: Runtime, control: Control, name: str, text: str, value: object
+) -> None:
+    outcome = _ask(control, Step("set_property", "counter", name, text))
+    assert outcome.success, outcome.message
+    present = {item.name: item.value for item in _part(runtime, "counter").properties}
+    assert present[name] == value
+
+
 def test_force_is_the_kernel_s_to_use(
     runtime: Runtime, control: Control, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -206,6 +206,9 @@ RUN_BY: dict[str, dict[str, tuple[str, ...]]] = {
             "ros/executor/test_values.py::test_echo",
             "ros/executor/test_values.py::test_echo_as_a_table",
         ),
+        "mauve get /robot_1/executor control.max_speed": (
+            "ros/executor/test_values.py::test_get_prints_a_property_or_a_field",
+        ),
         "mauve mirror /robot_1/executor pose   ": (
             "ros/executor/test_values.py::test_the_command_starts_and_stops_a_mirror",
         ),

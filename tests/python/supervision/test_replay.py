@@ -4,10 +4,11 @@ import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from std_msgs.msg import Float64
 from synthetic_traces import EPOCH_NS, MS, PERIOD_NS, ROOT, deploy, overrun, record, run, swap
 from trace_decisions import REALTIME_OFFSET_NS
 
@@ -92,9 +93,9 @@ def test_silence_of_a_topic_is_acted_on_and_undone(rules_of: RulesOf, tmp_path: 
 
 def test_values_of_a_field_are_held_against_a_bound(rules_of: RulesOf, tmp_path: Path) -> None:
     level = [
-        (100, SimpleNamespace(data=0.5)),
-        (200, SimpleNamespace(data=0.1)),
-        (300, SimpleNamespace(data=0.6)),
+        (100, Float64(data=0.5)),
+        (200, Float64(data=0.1)),
+        (300, Float64(data=0.6)),
     ]
     trace = bag(tmp_path / "bag", runs(70), {"/battery": level})
     rules = rules_of("value: {topic: battery, type: p/msg/T, field: data, below: 0.2}")
@@ -178,12 +179,12 @@ def test_changes_are_commits_of_a_component_and_all_turns_of_the_architecture(
 
 
 def test_the_level_of_a_diagnostic_where_it_is_recorded(rules_of: RulesOf, tmp_path: Path) -> None:
-    def told(level: int) -> SimpleNamespace:
-        other = SimpleNamespace(name="other", level=2)
-        return SimpleNamespace(status=[other, SimpleNamespace(name="motor", level=level)])
+    def told(level: bytes) -> DiagnosticArray:
+        other = DiagnosticStatus(name="other", level=b"\2")
+        return DiagnosticArray(status=[other, DiagnosticStatus(name="motor", level=level)])
 
     rules = rules_of("diagnostic: {status: motor, level: ERROR}", more="in: supervisor")
-    trace = bag(tmp_path / "bag", runs(70), {"/diagnostics": [(100, told(0)), (200, told(2))]})
+    trace = bag(tmp_path / "bag", runs(70), {"/diagnostics": [(100, told(b"\0")), (200, told(b"\2"))]})
     assert acts(rules, trace) == [(200, "do")]
     assert RecordedSignals(bag(tmp_path / "other", runs(5))).missing(rules.rules.rules[0]) == [
         "topic /diagnostics"

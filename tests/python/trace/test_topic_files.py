@@ -12,7 +12,6 @@ from rosbags.typesys import Stores, get_typestore
 from mauve_rt.trace import open as open_trace
 from mauve_rt.trace.export.csv_files import export_csv
 from mauve_rt.trace.export.topic_files import _file_name
-from mauve_rt.trace.format.message_fields import MOST_ELEMENTS
 from mauve_rt.trace.recording.recorder import Recorder
 from mauve_rt.trace.recording.synthetic import SyntheticSource
 
@@ -93,22 +92,24 @@ def test_each_topic_has_a_file_with_a_row_for_each_message(tmp_path: Path) -> No
     assert own == [], "the trace's own topics are the other files"
 
 
-def test_an_array_is_one_column_and_a_large_one_is_its_length(tmp_path: Path) -> None:
-    folder = export(
-        tmp_path,
-        [
-            ("/scan", scan(3)),
-            ("/scan", scan(MOST_ELEMENTS)),
-            ("/scan", scan(MOST_ELEMENTS + 1)),
-            ("/path", path_of(2)),
-        ],
-    )
+def test_an_array_is_one_column_and_has_all_its_elements(tmp_path: Path) -> None:
+    long = 1080  # as a laser scanner's
+    folder = export(tmp_path, [("/scan", scan(3)), ("/scan", scan(long)), ("/path", path_of(2))])
     ranges = pd.read_csv(folder / "topic.scan.csv")["ranges"].tolist()
     assert json.loads(ranges[0]) == [0.0, 0.25, 0.5]
-    assert len(json.loads(ranges[1])) == MOST_ELEMENTS
-    assert ranges[2] == f"{MOST_ELEMENTS + 1} elements"
+    assert json.loads(ranges[1]) == [number / 4 for number in range(long)]
     points = pd.read_csv(folder / "topic.path.csv")["points"].tolist()
     assert json.loads(points[0]) == [{"x": 0.0, "y": 0.0, "z": 0.0}, {"x": 1.0, "y": 0.0, "z": 0.0}]
+
+
+def test_an_array_with_nan_and_infinities_is_json(tmp_path: Path) -> None:
+    name, message = scan(4)
+    message.ranges[:3] = [np.nan, np.inf, -np.inf]
+    folder = export(tmp_path, [("/scan", (name, message))])
+    (ranges,) = pd.read_csv(folder / "topic.scan.csv")["ranges"].tolist()
+    assert json.loads(ranges, parse_constant=pytest.fail) == [None, "Infinity", "-Infinity", 0.75]
+    numbers = np.array(json.loads(ranges), np.float64)
+    assert np.array_equal(numbers, message.ranges, equal_nan=True)
 
 
 def test_a_topic_that_cannot_be_read_costs_no_other_one(tmp_path: Path) -> None:

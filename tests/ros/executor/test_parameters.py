@@ -165,12 +165,31 @@ def _changes_are_the_kernel_s(face: Face, graph: Any) -> None:
     assert events[2].cause == "parameters set: counter.step, counter.enabled"
 
 
+def test_a_value_gets_its_declared_type(face: Face) -> None:
+    """ros2cli sends `5e-06` as text, `2` as an integer, and `[]` as an array of bytes."""
+    assert face.set(counter__step="5e-06")[0].successful
+    assert face.set(counter__label="007")[0].successful
+    assert face.get("counter.step", "counter.label") == [5e-06, "007"]
+    assert face.set(counter__step=2)[0].successful
+    assert face.set(counter__enabled="true")[0].successful
+    assert face.get("counter.step", "counter.enabled") == [2.0, True]
+    arrays = [kind for kind in Parameter.Type if kind.name.endswith("_ARRAY")]
+    for kind in arrays:
+        empty = ParameterMessage(name="record_topics", value=ParameterValue(type=kind.value))
+        (result,) = face.set(record_topics=empty)
+        assert (result.successful, result.reason) == (True, ""), kind
+
+
 REFUSED: dict[str, tuple[dict[str, object], str]] = {
     "out of range": ({"counter__step": 11.0}, "expected at least 0 and at most 10, found 11"),
     "wrong type": ({"counter__period_ms": 2.5}, "expected a whole number, found 2.5"),
     "text": ({"counter__step": "fast"}, "expected a number, found 'fast'"),
     "no number": ({"counter__step": float("nan")}, "expected at least 0"),
     "list": ({"counter__step": [1.0]}, "expected true, false, a number or text, found a double array"),
+    "text that ros2 reads as a number": (
+        {"counter__label": 7},
+        "'counter.label': expected text, found 7, as ros2 reads some text. Put the text in quotes of its own",
+    ),
     "unset": ({"counter__step": None}, "expected true, false, a number or text, found nothing"),
     "no type": (
         {"x": ParameterMessage(name="counter.step", value=ParameterValue(type=77))},

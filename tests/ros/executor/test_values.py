@@ -2,6 +2,8 @@
 
 import csv
 import io
+import json
+import math
 import os
 import subprocess
 import sys
@@ -21,7 +23,7 @@ from std_msgs.msg import Float64
 
 import mauve_rt.trace
 from mauve_msgs.msg import ReplyCode, Value, ValueNames, Values
-from mauve_msgs.srv import ListComponents, Mirror, ReadValues, Reconfigure, StartRecording
+from mauve_msgs.srv import ListComponents, ListRules, Mirror, ReadValues, Reconfigure, StartRecording
 from mauve_rt._kernel import Simulation
 from mauve_rt.errors import ArchitectureFileError
 from mauve_rt.model import load_architecture
@@ -265,6 +267,67 @@ def test_a_mirror_of_an_own_struct(running: Any, graph: Any) -> None:
     graph.spin_until(lambda: graph.node.count_publishers(topic) == 0, "its end")
 
 
+def test_a_mirror_of_one_element_of_a_sequence(running: Any, graph: Any) -> None:
+    del running
+    heard = {}
+    for path in ("codes[1]", "codes.length", "corners[1].z", "rates[1]"):
+        done = graph.ask(Mirror, f"{NODE}/mirror", name="attitude", field=path, rate_hz=200.0)
+        assert (done.success, done.type) == (True, "std_msgs/msg/Float64"), done.message
+        heard[path] = next(graph.hear(Float64, topic) for topic in done.topics)
+    graph.spin_until(lambda: all(len(each) > 20 for each in heard.values()), "numbers")
+    lengths = {each.data for each in heard["codes.length"]}
+    assert lengths == {0.0, 1.0, 2.0}
+    elements = [each.data for each in heard["codes[1]"]]
+    assert any(math.isnan(each) for each in elements), "a shorter list has no such element"
+    assert any(not math.isnan(each) for each in elements)
+    assert all(each.data > 0 for each in heard["rates[1]"])
+
+
+def test_rules_of_the_executor_take_elements_of_bounded_lists(
+    start_executor: Callable[..., Any], tmp_path: Path, graph: Any
+) -> None:
+    (tmp_path / "robot.yaml").write_text(ARCHITECTURE, encoding="utf-8")
+    fields = {"length": "codes.length, above: 1.5", "beyond": "'codes[3]', above: 1000"}
+    rules = "".join(
+        f"  - {{name: {name}, when: {{value: {{resource: attitude, field: {field}}}}}, "
+        "do: [{kind: stop, target: caller}]}\n"
+        for name, field in fields.items()
+    )
+    (tmp_path / "rules.yaml").write_text(f"mauve: 1\nrules:\n{rules}", encoding="utf-8")
+    files = ("-p", f"architecture:={tmp_path / 'robot.yaml'}", "-p", f"rules:={tmp_path / 'rules.yaml'}")
+    start_executor(*files)
+
+    def held() -> set[str]:
+        found = graph.ask(ListRules, f"{NODE}/list_rules").rules
+        assert [each.problem for each in found] == [""] * 2
+        return {each.name for each in found if each.known and each.holds}
+
+    graph.spin_until(lambda: "length" in held(), "a list of two codes")
+    graph.spin_until(lambda: "beyond" in held(), "no number where the list has no fourth code")
+
+
+def test_get_prints_a_property_or_a_field(mauve: Callable[..., Any], graph: Any) -> None:
+    graph.spin_until(lambda: ask(graph, "attitude")[0].writes > 0, "a value")
+    for name, printed in (
+        ("attitude.mode", "cruise"),
+        ("attitude.corners[1].y", "8.0"),
+        ("pilot.attitude.rates.length", "3"),
+        ("caller.period_ms", None),
+    ):
+        done = mauve("get", NODE, name)
+        assert (done.returncode, done.stderr) == (0, ""), name
+        assert printed is None or done.stdout == f"{printed}\n"
+    whole = json.loads(mauve("get", NODE, "place", "--json").stdout)
+    assert sorted(whole) == ["x", "y", "z"]
+    for name, problem in (
+        ("plase", "no property, resource or port is named 'plase'; did you mean place?"),
+        ("place.w", "no field 'w' in 'w'; expected one of x, y, z"),
+        ("scan", "scan (sensor_msgs/msg/LaserScan): nothing was written yet"),
+    ):
+        refused = mauve("get", NODE, name)
+        assert (refused.returncode, refused.stdout, refused.stderr) == (1, "", f"refused: {problem}\n")
+
+
 def test_a_mirror_ends_with_its_resource(running: Any, graph: Any) -> None:
     del running
     assert graph.ask(Mirror, f"{NODE}/mirror", name="scan").success
@@ -296,7 +359,9 @@ def _step(**fields: str) -> Any:
         ({"name": "place", "topic": "/robot_1/level"}, "topic /robot_1/level is bound already"),
         ({"name": "place", "topic": "/taken"}, "topic /taken has "),
         ({"name": "place", "topic": "no name"}, "topic 'no name': "),
-        ({"name": "scan", "field": "ranges[0]"}, "sensor_msgs/msg/LaserScan has no number 'ranges[0]'"),
+        ({"name": "scan", "field": "ranges"}, "sensor_msgs/msg/LaserScan has no number 'ranges'"),
+        ({"name": "scan", "field": "ranges[x]"}, "sensor_msgs/msg/LaserScan has no number 'ranges[x]'"),
+        ({"name": "words", "field": "data"}, "std_msgs/msg/String has no number 'data'; mauve echo shows"),
     ],
 )
 def test_mirrors_that_cannot_be(running: Any, graph: Any, request_: dict[str, Any], message: str) -> None:

@@ -28,7 +28,7 @@ from mauve_rt.trace.recording.synthetic import SyntheticSource
 from mauve_rt.trace.report import write_report
 from mauve_rt.trace.report.analysis import analyse
 from mauve_rt.trace.report.columns import Columns, read_columns
-from mauve_rt.trace.report.swap_values import MOST_VALUES, swap_values, values_around_swap
+from mauve_rt.trace.report.swap_values import MOST_VALUES, _shortened, swap_values, values_around_swap
 from mauve_rt.trace.report.timeline import timeline_data
 from mauve_rt.trace.report.values import MOST_CURVES, MOST_ENTRIES, values_section
 
@@ -195,6 +195,20 @@ def test_a_swap_shows_the_values_that_change_most_relative_to_before():
     (one,) = analyse(trace).swaps
     _, told = values_around_swap(analyse(trace), one.measured)
     assert "Of 10 values those that change most." in told
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["target.joints[0].position", "target.joints[1].position", "target.joints[12].position"],
+        ["pose.position.x", "arm_of_the_first_robot.torque", "arm_of_the_second_robot.torque"],
+        ["a" * 40 + "1" + "b" * 40, "a" * 40 + "2" + "b" * 40],
+    ],
+)
+def test_shortened_names_of_curves_stay_different(names: list[str]) -> None:
+    found = _shortened(names)
+    assert len({*found}) == len(names)
+    assert all(len(short) <= len("1: ") + 22 for short in found)
 
 
 def test_the_figure_of_a_swap_has_a_curve_for_each_value(tmp_path: Path):

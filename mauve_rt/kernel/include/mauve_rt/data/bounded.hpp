@@ -12,6 +12,11 @@
 
 namespace mauve {
 
+namespace detail {
+template <typename T>
+struct FindNumber;
+}
+
 /// At most N elements, stored in place; trivially copyable when T is. Not thread-safe. All functions [rt].
 template <typename T, std::size_t N>
 class BoundedVector {
@@ -45,6 +50,8 @@ class BoundedVector {
   const T* end() const MAUVE_RT { return items_.data() + size_; }
 
  private:
+  friend struct detail::FindNumber<BoundedVector>;  // reads a length by its place
+
   std::uint32_t size_{0};
   std::array<T, N> items_{};
 };

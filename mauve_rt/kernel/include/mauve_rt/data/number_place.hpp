@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <memory>
@@ -20,13 +21,27 @@ namespace mauve {
 
 /// Where in a struct the number lies, and as what.
 struct NumberPlace {
+  /// Of a BoundedVector that has the number: where its length is, and the index of the element.
+  struct Element {
+    std::size_t length_offset{0};
+    std::size_t index{0};
+  };
+
   std::size_t offset{0};
   double (*convert)(const std::byte* at) noexcept {nullptr};
-  void (*store)(std::byte* at, double number, double toward) noexcept {nullptr};  // nullptr: of a bool
+  /// nullptr: the number is a bool, or in a BoundedVector, and cannot be limited.
+  void (*store)(std::byte* at, double number, double toward) noexcept {nullptr};
+  std::optional<Element> element{};  // none: the number is always there
 
-  /// [rt]
+  /// NaN where the list is too short. [rt]
   double of(const void* value) const MAUVE_RT {
-    return MAUVE_RT_TRUSTED(convert(static_cast<const std::byte*>(value) + offset));  // one of those below
+    const auto* const begin = static_cast<const std::byte*>(value);
+    if (element) {
+      std::uint32_t length = 0;
+      std::memcpy(&length, begin + element->length_offset, sizeof(length));
+      if (element->index >= length) return std::numeric_limits<double>::quiet_NaN();
+    }
+    return MAUVE_RT_TRUSTED(convert(begin + offset));  // one of those below
   }
   /// Writes a finite number into the value, rounded toward the second one, which its type can hold. [rt]
   void set(void* value, double number, double toward) const MAUVE_RT {
@@ -52,7 +67,7 @@ inline bool is_field(std::string_view member, std::string_view field) {
 }
 
 template <typename T>
-struct FindNumber {  // texts, and lists whose length changes, have no number at a fixed place
+struct FindNumber {  // texts, and lists without a bound, have no number at a fixed place
   static std::optional<NumberPlace> in(const T& /*value*/, std::string_view /*path*/) { return {}; }
 };
 
@@ -93,24 +108,54 @@ struct FindNumber<T> {
 };
 
 template <typename Outer, typename Inner>
+std::size_t offset_within(const Outer& outer, const Inner& inner) {
+  return static_cast<std::size_t>(reinterpret_cast<const std::byte*>(&inner) -
+                                  reinterpret_cast<const std::byte*>(&outer));
+}
+
+template <typename Outer, typename Inner>
 std::optional<NumberPlace> find_inner(const Outer& outer, const Inner& inner, std::string_view path) {
   std::optional<NumberPlace> found = FindNumber<Inner>::in(inner, path);
   if (found) {
-    found->offset += static_cast<std::size_t>(reinterpret_cast<const std::byte*>(&inner) -
-                                              reinterpret_cast<const std::byte*>(&outer));
+    found->offset += offset_within(outer, inner);
+    if (found->element) found->element->length_offset += offset_within(outer, inner);
   }
   return found;
+}
+
+/// The index of "[3]", the first part of a path, which is taken off its front; nothing: it is none below `count`.
+inline std::optional<std::size_t> next_index(std::string_view& path, std::size_t count) {
+  const std::string_view part = next_part(path);
+  if (part.size() < 3 || part.front() != '[' || part.back() != ']') return {};
+  std::size_t index = 0;
+  const auto [end, error] = std::from_chars(part.data() + 1, part.data() + part.size() - 1, index);
+  if (error != std::errc() || end != part.data() + part.size() - 1 || index >= count) return {};
+  return index;
 }
 
 template <typename T, std::size_t N>
 struct FindNumber<std::array<T, N>> {
   static std::optional<NumberPlace> in(const std::array<T, N>& value, std::string_view path) {
-    const std::string_view part = next_part(path);
-    if (part.size() < 3 || part.front() != '[' || part.back() != ']') return {};
-    std::size_t index = 0;
-    const auto [end, error] = std::from_chars(part.data() + 1, part.data() + part.size() - 1, index);
-    if (error != std::errc() || end != part.data() + part.size() - 1 || index >= N) return {};
-    return find_inner(value, value[index], path);
+    const std::optional<std::size_t> index = next_index(path, N);
+    return index ? find_inner(value, value[*index], path) : std::nullopt;
+  }
+};
+
+template <typename T, std::size_t N>
+struct FindNumber<BoundedVector<T, N>> {
+  static std::optional<NumberPlace> in(const BoundedVector<T, N>& value, std::string_view path) {
+    if (path == "length") {
+      std::optional<NumberPlace> length = find_inner(value, value.size_, "");
+      if (length) length->store = nullptr;
+      return length;
+    }
+    const std::optional<std::size_t> index = next_index(path, N);
+    if (!index) return {};
+    std::optional<NumberPlace> found = find_inner(value, value[*index], path);
+    if (!found || found->element) return {};  // in a list within this one
+    found->store = nullptr;
+    found->element = {.length_offset = offset_within(value, value.size_), .index = *index};
+    return found;
   }
 };
 
@@ -157,7 +202,8 @@ inline std::vector<std::string> number_paths(const MessageShape& message, std::s
   return paths;
 }
 
-/// The number at a path such as twist.linear.x or ranges[3]; nothing: there is none at a fixed place. [non-rt]
+/// The number at a path such as twist.linear.x, ranges[3] or ranges.length; nothing: there is none at a fixed
+/// place. An element of a BoundedVector is found up to the vector's capacity. [non-rt]
 template <Described T>
 std::optional<NumberPlace> find_number(std::string_view path) {
   const auto value = std::make_unique<T>();
