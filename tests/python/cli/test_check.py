@@ -238,7 +238,7 @@ def test_a_type_that_the_executor_could_not_load_is_found(
     status, out, [error] = check(robot=ROBOT)
     assert (status, out) == (2, [])
     assert error.startswith(
-        "robot:8:46: resource 'set': type std_msgs/msg/Float64: "
+        "robot:8:56: resource 'set': type std_msgs/msg/Float64: "
         "the message type is installed, and cannot be loaded; "
         "expected prefix/lib/libstd_msgs__rosidl_typesupport_c.so, found "
     )

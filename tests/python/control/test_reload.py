@@ -132,7 +132,7 @@ def test_limits_of_a_probation_name_component_and_output(world: World, rebuilt: 
     rebuilt.build("CRASH")  # never tried: the limits come first
     for output, why in (
         ("twin.total.data", "'twin.total.data' is no output of loop, twin, python"),
-        ("other.sum.data", "did you mean loop.sum"),
+        ("other.sum.data", "known: loop.sum, python.sum, twin.sum"),
         ("loop.sum.velocity", "found velocity; name the field of a number"),
     ):
         limit = f"{{output: {output}, maximum: 1.0}}"
