@@ -12,7 +12,7 @@ from compiled_plugins import PLUGINS, compile_source, link
 MACROS = {
     "reload_tests_values": ("STEP", "GAIN", "CRASH", "HANG", "MISSING"),
     "reload_tests_types": ("OTHER_LAYOUT",),
-    "reload_tests": ("OTHER_", "WITHOUT_", "THROWS", "NEW_CORE", "MAUVE_RT_VERSION"),
+    "reload_tests": ("OTHER_", "WITHOUT_", "THROWS", "ADOPTS", "NEW_CORE", "MAUVE_RT_VERSION"),
 }
 PYTHON_CORE = """\
 from std_msgs.msg import Float64

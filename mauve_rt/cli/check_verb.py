@@ -114,6 +114,7 @@ def _warn(path: Path, warnings: "Iterable[Problem]") -> None:
 
 def _check_architecture(path: Path, models: "Sequence[PackageModel]", uses: "Uses") -> "Subject":
     from mauve_rt.control.limits import bytes_of_resource  # noqa: PLC0415
+    from mauve_rt.interfaces.bound_types import type_problems  # noqa: PLC0415
     from mauve_rt.model import build, configure, load_architecture  # noqa: PLC0415
     from mauve_rt.model.modelled_parts import modelled_parts  # noqa: PLC0415
     from mauve_rt.model.remarks import Subject  # noqa: PLC0415
@@ -124,9 +125,10 @@ def _check_architecture(path: Path, models: "Sequence[PackageModel]", uses: "Use
     architecture = build(model, parts.registry, index=parts.index)
     configure(model, architecture)
     subject = Subject(model, architecture, uses)
+    unloaded = [*type_problems(model, architecture, parts.types)]
     architecture.cleanup()
-    if late := late_writers(model):
-        raise ArchitectureFileError(path, late)
+    if problems := unloaded + late_writers(model):
+        raise ArchitectureFileError(path, problems)
     counts = {
         "component": len(model.components),
         "resource": len(model.resources),

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from mauve_msgs.msg import ReplyCode
 from mauve_msgs.srv import ListComponents, ReadValues, Reload
 from mauve_rt.cli.client import Client
 from mauve_rt.cli.dev_outputs import output_names
@@ -32,6 +33,9 @@ class DevExecutor:
         self._instance_id = ""
         self._components: Sequence[Any] = ()
         self._heard_s = 0.0
+        self.refusal: str | None = None if trial.probation_s and trial.revert_on else ""
+        """Why the executor would refuse this probation; empty: it would not; None: not known yet."""
+        self._check = client.exchange(Reload, f"{name}/reload")
         self._list = client.poll(ListComponents, f"{name}/list_components", every_s=_LIST_S)
         self._links = Links(
             reload=client.exchange(Reload, f"{name}/reload"),
@@ -56,12 +60,23 @@ class DevExecutor:
         if (reply := self._list.look(ListComponents.Request)) is not None:
             self._instance_id, self._components = reply.instance_id, reply.components
             self._heard_s = time.monotonic()
+            if self.refusal is None and not self._check.is_busy:
+                request = self._request()
+                request.dry_run = True
+                self._check.send(request)
+        if (checked := self._check.look(time.monotonic())) is not None:
+            self.refusal = checked.message if checked.code == ReplyCode.INVALID else ""
 
     def reload(self, *, back: bool) -> ReloadRun:
         """Begin a reload: of the rebuilt code on probation, or of the code before, without a probation."""
-        targets = [*self._trial.targets]
-        request = Reload.Request(requested_by="mauve dev", targets=targets, back=back)
-        if not back:
-            request.probation_s = self._trial.probation_s
-            request.revert_on = [*self._trial.revert_on] if self._trial.probation_s else []
-        return ReloadRun(self._links, request, output_names(self._components, targets))
+        request = self._request() if not back else Reload.Request(targets=[*self._trial.targets], back=True)
+        request.requested_by = "mauve dev"
+        return ReloadRun(self._links, request, output_names(self._components, request.targets))
+
+    def _request(self) -> Any:
+        trial = self._trial
+        return Reload.Request(
+            targets=[*trial.targets],
+            probation_s=trial.probation_s,
+            revert_on=[*trial.revert_on] if trial.probation_s else [],
+        )

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from mauve_rt.cli.arguments import add_executor
 from mauve_rt.cli.completion import complete_components, completed_by
-from mauve_rt.cli.verb import OK, REFUSED
+from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED
 
 if TYPE_CHECKING:
     from mauve_rt.cli.client import Client
@@ -66,7 +66,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="extend",
         default=[],
         metavar="VIOLATION",
-        help="violations that put the old code back, e.g. fault, overrun or nan (default: fault and nan)",
+        help="violations that put the old code back: fault, overrun, over_declared, nan, or "
+        "{output: COMPONENT.PORT.FIELD, minimum: X, maximum: Y}, where COMPONENT. may be left out "
+        "(default: fault and nan)",
     )
     parser.add_argument(
         "--once", action="store_true", help="build, test and reload the present sources, and end"
@@ -90,30 +92,36 @@ def main(args: argparse.Namespace) -> int:
         executor = DevExecutor(client, args.executor, trial)
         plan = Plan(args.build, args.test, args.probation)
         development = Development(plan, executor, tell=_ignore if has_screen else _print_event)
+        status = OK
         try:
             if args.once:
-                return _run_once(client, executor, development)
-            if has_screen:
+                status = _run_once(client, executor, development)
+            elif has_screen:
                 _show(client, executor, development, sources)
             else:
                 _print_event(f"watching {sources.count} files")
-                _follow(client, development, sources, _continue)
+                _follow(client, executor, development, sources, _continue)
+            if executor.refusal:
+                print(f"dev: {executor.name} would refuse the reload: {executor.refusal}", file=sys.stderr)
+                return BAD_USAGE
         except KeyboardInterrupt:
             pass
         finally:
             development.end()
-    return OK
+    return status
 
 
 def _run_once(client: "Client", executor: "DevExecutor", development: "Development") -> int:
     from mauve_rt.cli.client import NoExecutorError  # noqa: PLC0415
 
     begun_s = time.monotonic()
-    while not executor.is_there:
+    while not executor.is_there or executor.refusal is None:
         if time.monotonic() >= begun_s + _FIRST_S:
             raise NoExecutorError(f"no answer from {executor.name}; see mauve nodes")
         client.spin()
         executor.look()
+    if executor.refusal:
+        return BAD_USAGE
     development.again()
     while development.is_busy:
         client.spin()
@@ -122,9 +130,13 @@ def _run_once(client: "Client", executor: "DevExecutor", development: "Developme
 
 
 def _follow(
-    client: "Client", development: "Development", sources: "Sources", goes_on: Callable[[], bool]
+    client: "Client",
+    executor: "DevExecutor",
+    development: "Development",
+    sources: "Sources",
+    goes_on: Callable[[], bool],
 ) -> None:
-    while goes_on():
+    while goes_on() and not executor.refusal:
         client.spin()
         if (save := sources.look()) is not None:
             development.save(save)
@@ -153,7 +165,7 @@ def _show(client: "Client", executor: "DevExecutor", development: "Development",
                 shown_s = time.monotonic()
             return True
 
-        _follow(client, development, sources, goes_on)
+        _follow(client, executor, development, sources, goes_on)
 
 
 def press(key: str, development: "Development") -> bool:

@@ -141,8 +141,8 @@ def _add_probation(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="V",
-        help="violation: fault, overrun, over_declared, nan, or {output: PORT.FIELD, minimum: X, "
-        "maximum: Y}; may be repeated (default: fault and nan)",
+        help="violation: fault, overrun, over_declared, nan, or {output: COMPONENT.PORT.FIELD, minimum: X, "
+        "maximum: Y}, where COMPONENT. may be left out; may be repeated (default: fault and nan)",
     )
     parser.add_argument(
         "--probation-releases",

@@ -42,6 +42,8 @@ class Reload:
         self.probation = self._read_probation()
         with self.runtime.loading() as loader:
             chosen = self._chosen(loader)
+        self._check_limits(names_of(chosen))
+        with self.runtime.loading() as loader:
             if self.order.back:
                 return self._go_back(loader, chosen, dry_run=dry_run)
             rebuilt = loader.generations.rebuilt(chosen)
@@ -72,7 +74,7 @@ class Reload:
                 steps.append(Step(f"replace_{kind}", part.name, getattr(part, kind)))
                 if kind == "core" and self.probation is not None:
                     ports = self.runtime.registry.describe_shell(part.shell).ports
-                    transaction.replace_core(part.name, part.core, self.probation.options(ports))
+                    transaction.replace_core(part.name, part.core, self.probation.options(part.name, ports))
                 else:
                     transaction.add(steps[-1].kind, part.name, steps[-1].name)
             for name, value in self._new_defaults(part).items() if "shell" in used else ():
@@ -137,6 +139,22 @@ class Reload:
             return read_probation(read_yaml(self.order.probation))
         except (YamlError, ValueError) as error:
             raise RefusalError(Code.INVALID, f"probation: {error}") from None
+
+    def _check_limits(self, names: Collection[Name]) -> None:
+        """That each limit of the probation is one of an output: before the new code is tried."""
+        if self.probation is None or all(isinstance(each, str) for each in self.probation.revert_on):
+            return
+        changed = [part for part in self.parts if {*self._names_of(part)} & {*names}]
+        ports = {part.name: self.runtime.registry.describe_shell(part.shell).ports for part in changed}
+        try:
+            self.probation.require_outputs(ports)
+        except ValueError as error:
+            raise RefusalError(Code.INVALID, f"probation: {error}") from None
+        transaction = Transaction()
+        for part in changed:
+            options = self.probation.options(part.name, ports[part.name])
+            transaction.replace_core(part.name, part.core, options)
+        self.runtime.host.make(transaction, dry_run=True)
 
     def _on_probation(self, part: ComponentDescription, used: list[str]) -> list[str]:
         """The shell stays, which the old core goes back to."""

@@ -191,6 +191,9 @@ class Plan:
             given = trial.pop("bumpless", None) if isinstance(trial, dict) else None
             bumpless = read_bumpless(given) if given is not None else None
             probation = read_probation(trial) if trial or bumpless is None else None
+            ports = self._ports(step.target, sketch)
+            if probation is not None:
+                probation.require_outputs({step.target: ports})
         except ValueError as error:
             raise RefusalError(Code.INVALID, f"{subject}: {error}") from None
         if not isinstance(self.transaction, Transaction):
@@ -200,7 +203,7 @@ class Plan:
         self.transaction.replace_core(
             step.target,
             step.name,
-            None if probation is None else probation.options(self._ports(step.target, sketch)),
+            None if probation is None else probation.options(step.target, ports),
             None if bumpless is None else bumpless.options(),
         )
 

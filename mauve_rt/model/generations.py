@@ -4,7 +4,6 @@ Nothing that is loaded is ever closed, so a way back costs no build. A generatio
 loaded. Its parts are in force for the registry: whatever is made from then on is of the newest generation.
 """
 
-import itertools
 import os
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -23,9 +22,6 @@ from mauve_rt.scratch import code_folder
 MARK = "@"  # in the names of copies and modules of a generation
 PART_KINDS = ("shell", "core", "fsm", "resource")
 _FIRST = 1
-_NUMBERS = itertools.count(
-    _FIRST + 1
-)  # of this process: copies and modules of a generation have it in their names
 
 Name = tuple[str, str]
 """Kind and name of a plug-in."""
@@ -61,7 +57,7 @@ class Generation:
 
 @dataclass(frozen=True, kw_only=True)
 class _Candidate:
-    number: int
+    copy_number: int
     sources: tuple[Source, ...]
     libraries: tuple[Path, ...]  # copies and what they need, in the order to open
     copied: frozenset[Path]  # the libraries themselves
@@ -74,6 +70,8 @@ class _Candidate:
 class CodeGenerations:
     """The generations of one process. Not thread-safe: for who holds the registry."""
 
+    _copies = _FIRST  # of the process: in the names of what was loaded last, be it in force or not
+
     def __init__(self, loaded: LoadedCode) -> None:
         self._loaded = loaded
         self._history: list[Generation] = []
@@ -81,6 +79,7 @@ class CodeGenerations:
         self._copied: set[Path] = set()  # libraries of which the first one is no longer in force
         self._packages: dict[str, tuple[int, tuple[str, ...]]] = {}  # by top-level package
         self.outdated: dict[Name, str] = {}
+        self._newest = _FIRST  # number of the last generation that was in force
 
     def rebuilt(self, sources: Collection[Source]) -> dict[str, list[Path]]:
         """The files that were changed since they were loaded, by source; none of a source that was not.
@@ -134,17 +133,18 @@ class CodeGenerations:
             if dry_run:
                 return None
             kept = PluginGeneration()
-            registry.begin_generation(candidate.number, kept)
+            number = self._newest + 1
+            registry.begin_generation(number, kept)
             before = dict(self._packages)
             try:
-                self._open(candidate, registry, add_python_parts)
+                self._open(candidate, number, registry, add_python_parts)
             except BaseException:
                 registry.end_generation()
                 registry.exchange(kept)
                 self._packages = before
                 raise
             registry.end_generation()
-        return self._keep(candidate, kept, before)
+        return self._keep(candidate, number, kept, before)
 
     def undo(self, generation: Generation, registry: PluginRegistry) -> None:
         """Put the code of before in force again: a generation that was loaded last is forgotten."""
@@ -153,7 +153,8 @@ class CodeGenerations:
         self._history.remove(generation)
 
     def commit(self, generation: Generation) -> None:
-        """The generation's parts run: its files are the loaded ones now."""
+        """The generation's parts run: its files are the loaded ones now, and its number is used up."""
+        self._newest = generation.number
         self._loaded.renew(generation.stamps)
         self._gone_back -= {*generation.sources}
         for name in generation.names:
@@ -229,7 +230,7 @@ class CodeGenerations:
     ) -> _Candidate:
         from mauve_rt.model.plugin_trial import Copies, try_plugins  # noqa: PLC0415
 
-        number = next(_NUMBERS)
+        number = self._copies + 1
         libraries = [source for source in sources if not source.is_python]
         changed = {*self._changed_libraries(), *self._copied} if libraries else set()
         files = [file for source in sources if source.is_python for file in self.module_files(source.target)]
@@ -255,7 +256,7 @@ class CodeGenerations:
         outdated = [name for name in _outdated(answer, names, registry) if name not in in_python]
         _check_not_in_use(outdated, in_use)
         return _Candidate(
-            number=number,
+            copy_number=number,
             sources=tuple(sources),
             libraries=opened,
             copied=frozenset(Path(library) for library in answer["copied"]),
@@ -276,11 +277,14 @@ class CodeGenerations:
         leading = {package for package in found if changed & {*self._dependencies(package)}}
         return tuple(sorted({own, *changed, *leading}))
 
-    def _open(self, candidate: _Candidate, registry: PluginRegistry, add_python_parts: Any) -> None:
+    def _open(
+        self, candidate: _Candidate, number: int, registry: PluginRegistry, add_python_parts: Any
+    ) -> None:
         import ctypes  # noqa: PLC0415
 
         from mauve_rt.model.module_generations import load_module  # noqa: PLC0415
 
+        CodeGenerations._copies = candidate.copy_number
         for library in candidate.libraries:
             if library.name in candidate.plugins:
                 registry.load_library(str(library))
@@ -288,11 +292,11 @@ class CodeGenerations:
                 ctypes.CDLL(str(library), mode=os.RTLD_NOW | os.RTLD_LOCAL)
         for module, packages in candidate.modules.items():
             for package in packages:
-                self._packages[package] = (candidate.number, packages)
-            loaded = load_module(module, generation=candidate.number, packages=packages)
+                self._packages[package] = (candidate.copy_number, packages)
+            loaded = load_module(module, generation=candidate.copy_number, packages=packages)
             add_python_parts(module, loaded)
         for kind, name in names_of(candidate.sources):
-            if kind in PART_KINDS and registry.generation_of(kind, name) != candidate.number:
+            if kind in PART_KINDS and registry.generation_of(kind, name) != number:
                 registry.drop(kind, name)
         for kind, name in candidate.outdated:
             registry.drop(kind, name)
@@ -300,6 +304,7 @@ class CodeGenerations:
     def _keep(
         self,
         candidate: _Candidate,
+        number: int,
         kept: PluginGeneration,
         packages_before: Mapping[str, tuple[int, tuple[str, ...]]],
     ) -> Generation:
@@ -309,7 +314,7 @@ class CodeGenerations:
                     candidate.stamps.files.setdefault(file, stamp)
         self._copied |= candidate.copied
         generation = Generation(
-            number=candidate.number,
+            number=number,
             sources=tuple(source.target for source in candidate.sources),
             names=names_of(candidate.sources),
             loaded=(*map(str, sorted(candidate.copied)), *candidate.modules),

@@ -23,10 +23,11 @@ from mauve_rt.parts.message_types import promise
 
 @dataclass(frozen=True)
 class ModelledParts:
-    """Parts of models in a registry, and the index of those that are installed."""
+    """Parts of models in a registry, the index of installed parts, and the types that the models declare."""
 
     registry: PluginRegistry
     index: PluginIndex
+    types: frozenset[str] = frozenset()
 
 
 def modelled_parts(models: Sequence[PackageModel]) -> ModelledParts:
@@ -37,14 +38,16 @@ def modelled_parts(models: Sequence[PackageModel]) -> ModelledParts:
     registry, index = PluginRegistry(), PluginIndex.installed()
     given = {model.package for model in models}
     modules: dict[str, object] = {}
+    types: set[str] = set()
     for model in _used_first(models):
+        types |= {*own_types(model)}
         promise(own_types(model))
         if model.package in given:
             modules[model.package] = _add(model, modules, registry)
             index = index.without(model.package)
         else:
             modules[model.package] = _bases(model)
-    return ModelledParts(registry, index)
+    return ModelledParts(registry, index, frozenset(types))
 
 
 def _used_first(models: Sequence[PackageModel]) -> Iterable[PackageModel]:

@@ -2,6 +2,8 @@
 
 {kind: replace_core, target: control, name: my_robot/Pid2,
  value: {probation_s: 5, revert_on: [fault, nan, {output: command.linear.x, minimum: -1, maximum: 1}]}}
+
+An output may be named with its component, too: control.command.linear.x.
 """
 
 import math
@@ -41,10 +43,11 @@ class Probation:
             value["releases"] = self.releases
         return value
 
-    def options(self, ports: Collection[PortDescription]) -> ProbationOptions:
-        """What the kernel takes, for a component with these ports."""
+    def options(self, component: str, ports: Collection[PortDescription]) -> ProbationOptions:
+        """What the kernel takes, for a component with these ports. Limits of others are left out."""
         named = {each for each in self.revert_on or DEFAULT_VIOLATIONS if isinstance(each, str)}
-        outputs = [_limit(each) for each in self.revert_on if isinstance(each, dict)]
+        found = (_limit(each, component, ports) for each in self._limits())
+        outputs = [limit for limit in found if limit is not None]
         if "nan" in named:
             outputs += [OutputLimit(port.name, not_nan=True) for port in ports if _has_numbers(port)]
         return ProbationOptions(
@@ -55,6 +58,24 @@ class Probation:
             outputs=outputs,
             min_releases=max(self.releases, 1),
         )
+
+    def require_outputs(self, components: Mapping[str, Collection[PortDescription]]) -> None:
+        """Check that each limit is one of an output of these components, given with their ports.
+
+        Raises:
+            ValueError: one is not; in words.
+        """
+        for limit in self._limits():
+            if any(_limit(limit, name, ports) is not None for name, ports in components.items()):
+                continue
+            outputs = [f"{name}.{each}" for name, ports in components.items() for each in _outputs(ports)]
+            hint = did_you_mean(str(limit["output"]), outputs)
+            given, names = shown(str(limit["output"])), ", ".join(components) or "a component"
+            text = f"revert_on: {given} is no output of {names}"
+            raise ValueError(f"{text}; expected PORT.FIELD or COMPONENT.PORT.FIELD; {hint}")
+
+    def _limits(self) -> list[Mapping[str, object]]:
+        return [each for each in self.revert_on if isinstance(each, dict)]
 
 
 def read_probation(value: object) -> Probation:
@@ -98,7 +119,9 @@ def _check_limit(limit: Mapping[str, object]) -> None:
             text = f"revert_on: unknown key {shown(str(key))}; {did_you_mean(str(key), _KEYS)}"
             raise ValueError(f"{text}; for a condition write a rule with the step revert_core")
     if not isinstance(limit.get("output"), str) or not limit["output"]:
-        raise ValueError("revert_on: an output's limit needs the key output: PORT or PORT.FIELD")
+        raise ValueError(
+            "revert_on: an output's limit needs the key output: PORT.FIELD or COMPONENT.PORT.FIELD"
+        )
     bounds = [limit[key] for key in ("minimum", "maximum") if key in limit]
     if not all(is_number(bound) for bound in bounds):
         raise ValueError(f"revert_on: output {limit['output']}: expected numbers as minimum and maximum")
@@ -109,8 +132,20 @@ def is_number(value: object) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _limit(limit: Mapping[str, object]) -> OutputLimit:
+def _outputs(ports: Collection[PortDescription]) -> list[str]:
+    return [port.name for port in ports if port.kind == "write"]
+
+
+def _limit(
+    limit: Mapping[str, object], component: str, ports: Collection[PortDescription]
+) -> OutputLimit | None:
+    """None: it names no output of this component."""
+    outputs = _outputs(ports)
     port, _, field = str(limit["output"]).partition(".")
+    if port == component and port not in outputs:
+        port, _, field = field.partition(".")
+    if port not in outputs:
+        return None
     least, most = limit.get("minimum"), limit.get("maximum")
     return OutputLimit(
         port,

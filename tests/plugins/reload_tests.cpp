@@ -41,6 +41,10 @@ class Loop : public mauve::Core<LoopShell> {
 #endif
   double sum_{0.0};
 
+#ifdef ADOPTS
+  bool adopt(const mauve::CoreBase& old) override { return dynamic_cast<const Loop*>(&old) != nullptr; }
+#endif
+
  public:
   virtual void act() {
     sum_ += step * shell().gain.value();

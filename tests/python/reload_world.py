@@ -8,7 +8,7 @@ from pathlib import Path
 
 from rebuilt_package import RebuiltPackage
 
-from mauve_rt._kernel import ComponentDescription, Simulation
+from mauve_rt._kernel import ComponentDescription, ProbationRecord, Simulation
 from mauve_rt.control.control import Control
 from mauve_rt.control.judging import Judge
 from mauve_rt.control.requests import Outcome, ReloadOrder, Request, Step
@@ -62,6 +62,16 @@ class World:
         while outcome.pending is not None:
             outcome = outcome.pending.look(outcome, wait_ns=100 * MS)
         return outcome
+
+    def decided(self) -> ProbationRecord:
+        """The last verdict on a core on probation."""
+        for _ in range(1000):
+            self.runtime.host.settle_probations()
+            records = [record for record in self.runtime.probations() if record.verdict != "running"]
+            if records:
+                return records[-1]
+            self.run(5)
+        raise AssertionError("no verdict")
 
     def part(self, name: str = "loop") -> ComponentDescription:
         return next(part for part in self.runtime.components() if part.name == name)

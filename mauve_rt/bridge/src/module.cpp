@@ -15,6 +15,7 @@
 #include "steady_waits.hpp"
 #include "stop_guard.hpp"
 #include "topic_receiver.hpp"
+#include "type_support.hpp"
 #include "types.hpp"
 
 namespace py = pybind11;
@@ -152,6 +153,11 @@ Once, after rclpy.init(), which was told `--disable-stdout-logs`.)");
       py::arg("severity"), py::arg("name"), py::arg("time_ns"), py::arg("text"), py::arg("function"),
       py::arg("file"), py::arg("line"), Unlocked(),
       "Write a line with a time of its own (CLOCK_REALTIME), to /rosout and the console.");
+  module.def("require_type_support", &require_type_support, py::arg("type"),
+             R"(Load what a topic, service or action of this type needs.
+
+Raises:
+    MauveError: the type is not installed, or cannot be loaded.)");
   module.def("flush_console", &Console::flush, py::arg("timeout_ns"), Unlocked(),
              "Wait until all lines are written; False: the console is not read.");
   module.def("wait_by_the_monotonic_clock", &wait_by_the_monotonic_clock,

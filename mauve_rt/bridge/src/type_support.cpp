@@ -46,12 +46,27 @@ class TypeName {
                  .found = found,
                  .remedy = "install the package, and source the setup file of its workspace"});
   }
+  /// The package is installed, and what its libraries need is not found.
+  [[noreturn]] void throw_not_loaded(const std::filesystem::path& library, const std::string& why) const {
+    const std::filesystem::path setup =
+        library.parent_path().parent_path() / "share" / package_ / "local_setup.bash";
+    throw Error(ErrorCode::unknown_type, "the " + noun(kind_) + " type is installed, and cannot be loaded",
+                {.element = "type " + full_,
+                 .expected = library,
+                 .found = why,
+                 .remedy = "source " + setup.string() + ", then start this program again"});
+  }
   /// A function of one of the package's generated libraries, which stays loaded.
   template <typename Function>
   Function find(const std::string& library_suffix, const std::string& before,
                 const std::string& after) const {
-    void* library = dlopen(library_path(library_suffix).c_str(), RTLD_LAZY | RTLD_LOCAL);
-    if (library == nullptr) throw_unknown("no library with its package's type supports");
+    const std::filesystem::path path = library_path(library_suffix);
+    void* library = dlopen(path.c_str(), RTLD_LAZY | RTLD_LOCAL);
+    if (library == nullptr) {
+      const std::string why = dlerror();
+      if (path.has_parent_path()) throw_not_loaded(path, why);
+      throw_unknown("no library with its package's type supports");
+    }
     const std::string symbol = before + package_ + "__" + kind_ + "__" + name_ + after;
     const auto found = reinterpret_cast<Function>(dlsym(library, symbol.c_str()));
     if (found == nullptr) throw_unknown("package " + package_ + " without a " + kind_ + " " + name_);
@@ -137,6 +152,15 @@ ActionTypeSupport action_type_support(const std::string& type) {
           .feedback = name.functions(action->feedback_message_type_support, "_FeedbackMessage"),
           .result = name.part_support(kTypeSupports, "_Result"),
           .result_offset = name.offset("_GetResult_Response", kResultField)};
+}
+
+void require_type_support(const std::string& type) {
+  if (type.find("/srv/") != std::string::npos)
+    call_type_support(type);
+  else if (type.find("/action/") != std::string::npos)
+    action_type_support(type);
+  else
+    message_type_support(type);
 }
 
 }  // namespace mauve::bridge

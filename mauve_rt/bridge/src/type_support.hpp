@@ -50,4 +50,7 @@ struct ActionTypeSupport {
 /// Of `package/action/Type`. [non-rt] Throws Error (unknown_type) when it is not installed.
 ActionTypeSupport action_type_support(const std::string& type);
 
+/// One of them. [non-rt] Throws Error (unknown_type) when it is not installed, or cannot be loaded.
+void require_type_support(const std::string& type);
+
 }  // namespace mauve::bridge

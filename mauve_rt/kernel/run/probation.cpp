@@ -423,8 +423,9 @@ std::string Probation::reason() const {
     case ProbationCause::overrun:
       return "overrun" + at;
     case ProbationCause::output: {
-      std::string text = "output " + found_.port->port.name() + ": " + found_.limit->path + " is " +
-                         number_text(found_.number);
+      const std::string& path = found_.limit->path;
+      std::string text = "output " + component_.name() + "." + found_.port->port.name() +
+                         (path.empty() ? "" : "." + path) + " is " + number_text(found_.number);
       if (found_.number < found_.limit->minimum) text += ", below " + number_text(found_.limit->minimum);
       if (found_.number > found_.limit->maximum) text += ", above " + number_text(found_.limit->maximum);
       return text;

@@ -15,6 +15,7 @@ from rclpy.qos import QoSProfile
 from mauve_rt._bridge import ActionReport, Bridge, CallReport, FlatNumbers, TopicReport
 from mauve_rt._kernel import Architecture, ResourceDescription
 from mauve_rt.errors import MauveError, TopicError
+from mauve_rt.interfaces.bound_types import bound_types
 from mauve_rt.interfaces.qos import native_qos, qos_profile, recorded_qos
 from mauve_rt.model import ArchitectureModel
 from mauve_rt.model.qos_remarks import qos_remarks, remark_text
@@ -112,10 +113,11 @@ class BoundResources:
             try:
                 for name, resource in resources.items():
                     numbers = opened.setdefault(name, [])
+                    types = dict(bound_types(resource, described[name]))
                     for topic, is_static in _topics(resource):
                         numbers.append(self._open_topic(bridge, name, resource, topic, is_static=is_static))
                     if resource.service is not None:
-                        numbers.append(_open_service(bridge, name, described[name], resource.service))
+                        numbers.append(_open_service(bridge, name, types["service"], resource.service))
                     if resource.action is not None:
                         numbers.append(_open_action(bridge, name, resource, resource.action))
             except MauveError:
@@ -339,11 +341,10 @@ def _topics(resource: ResourceModel) -> Iterator[tuple[TopicModel, bool]]:
     yield resource.topic, False
 
 
-def _open_service(bridge: Bridge, name: str, resource: ResourceDescription, service: ServiceModel) -> int:
+def _open_service(bridge: Bridge, name: str, type_name: str, service: ServiceModel) -> int:
     if service.offers is None:
-        return bridge.call(name, service.name, resource.type)
-    offered = next(each for each in resource.services if each.name == service.offers)
-    return bridge.offer(name, service.name, offered.type, service.offers)
+        return bridge.call(name, service.name, type_name)
+    return bridge.offer(name, service.name, type_name, service.offers)
 
 
 def _open_action(bridge: Bridge, name: str, resource: ResourceModel, action: ActionModel) -> int:

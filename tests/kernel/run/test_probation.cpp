@@ -159,7 +159,7 @@ TYPED_TEST(Probations, AValueThatBreaksALimitIsNotWritten) {
   this->wait_verdict(Verdict::reverted);
   EXPECT_FALSE(std::isnan(this->newest()));
   EXPECT_EQ(3, seen->runs);
-  EXPECT_EQ("output output: value is nan", this->record().reason);
+  EXPECT_EQ("output c.output.value is nan", this->record().reason);
   this->expect_old_core_runs_on(component);
   bad = 11.0;
   const auto second = this->put_in(
@@ -168,7 +168,7 @@ TYPED_TEST(Probations, AValueThatBreaksALimitIsNotWritten) {
   this->wait_verdict(Verdict::reverted);
   EXPECT_NE(11.0, this->newest());
   EXPECT_EQ(3, second->runs);
-  EXPECT_EQ("output output: value is 11, above 10", this->record().reason);
+  EXPECT_EQ("output c.output.value is 11, above 10", this->record().reason);
   this->expect_old_core_runs_on(component);
 }
 

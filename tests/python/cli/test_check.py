@@ -1,5 +1,6 @@
 """`mauve check` on files of every kind: what they are, what is wrong and where, the exit status."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -225,3 +226,20 @@ def test_a_file_that_requires_what_it_does_not_have_is_warned_of(check: Check) -
     [error] = check(robot=REQUIRED.replace("true", "maybe"))[2]
     assert "require_schedulable" in error
     assert "expected true, false or the word warn, found 'maybe'" in error
+
+
+def test_a_type_that_the_executor_could_not_load_is_found(
+    check: Check, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    library = tmp_path / "prefix" / "lib" / "libstd_msgs__rosidl_typesupport_c.so"
+    library.parent.mkdir(parents=True)
+    library.write_bytes(b"no library")
+    monkeypatch.setenv("AMENT_PREFIX_PATH", f"{library.parents[1]}:{os.environ['AMENT_PREFIX_PATH']}")
+    status, out, [error] = check(robot=ROBOT)
+    assert (status, out) == (2, [])
+    assert error.startswith(
+        "robot:8:56: resource 'set': type std_msgs/msg/Float64: "
+        "the message type is installed, and cannot be loaded; "
+        "expected prefix/lib/libstd_msgs__rosidl_typesupport_c.so, found "
+    )
+    assert error.endswith("source prefix/share/std_msgs/local_setup.bash, then start this program again")

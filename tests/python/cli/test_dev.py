@@ -336,7 +336,7 @@ def test_a_reload_that_changes_nothing(answer: Answer, outcome: str, *, is_good:
 @pytest.mark.parametrize(
     ("verdict", "outcome", "is_good"),
     [
-        (Verdict("reverted", "loop: output sum: data is nan"), "reverted", False),
+        (Verdict("reverted", "loop: output loop.sum.data is nan"), "reverted", False),
         (Verdict("inconclusive", "loop: no release"), "inconclusive", False),
         (Verdict("none"), "in force", True),
     ],

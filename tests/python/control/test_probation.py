@@ -9,7 +9,6 @@ import pytest
 from rebuilt_package import RebuiltPackage
 from reload_world import WORLDS, World, make_world_of_bad_cores
 
-from mauve_rt._kernel import ProbationRecord
 from mauve_rt.control.probations import ProbationWatch, Verdict
 from mauve_rt.control.reloads import Reload
 from mauve_rt.control.requests import Code, Outcome, Request, Step
@@ -28,21 +27,11 @@ def _replace(world: World, core: str, probation: str) -> Outcome:
     return world.ask(Step("replace_core", "loop", CORE.format(core), probation))
 
 
-def _decided(world: World) -> ProbationRecord:
-    for _ in range(1000):
-        world.runtime.host.settle_probations()
-        records = [record for record in world.runtime.probations() if record.verdict != "running"]
-        if records:
-            return records[-1]
-        world.run(5)
-    raise AssertionError("no verdict")
-
-
 def test_a_core_that_does_nothing_wrong_passes(world: World) -> None:
     outcome = _replace(world, "Other", "{probation_s: 0.05}")
     assert outcome.success, outcome.message
     assert outcome.report[0].taken == ("sum", "rounds")
-    record = _decided(world)
+    record = world.decided()
     assert (record.verdict, record.reason) == ("passed", "")
     assert record.releases >= 1
     assert world.part().core == CORE.format("Other")
@@ -50,10 +39,10 @@ def test_a_core_that_does_nothing_wrong_passes(world: World) -> None:
 
 REVERTED = {
     "Throws": ("{probation_s: 60}", "fault: the new code is broken in state act"),
-    "Nan": ("{probation_s: 60}", "output sum: data is nan"),
+    "Nan": ("{probation_s: 60}", "output loop.sum.data is nan"),
     "Loud": (
         "{probation_s: 60, revert_on: [{output: sum.data, maximum: 1000000.0}]}",
-        "output sum: data is 1e+09, above 1e+06",
+        "output loop.sum.data is 1e+09, above 1e+06",
     ),
 }
 
@@ -63,7 +52,7 @@ def test_a_violation_puts_the_old_core_back(world: World, core: str) -> None:
     probation, reason = REVERTED[core]
     before, first = world.sum()
     assert _replace(world, core, probation).success
-    record = _decided(world)
+    record = world.decided()
     assert (record.verdict, record.reason) == ("reverted", reason)
     assert (record.from_core, record.to_core) == (CORE.format("Loop"), CORE.format(core))
     part = world.part()
@@ -83,7 +72,7 @@ def test_a_violation_puts_the_old_core_back(world: World, core: str) -> None:
 
 def test_too_few_releases_are_inconclusive(world: World) -> None:
     assert _replace(world, "Other", "{probation_s: 0.02, releases: 1000000}").success
-    record = _decided(world)
+    record = world.decided()
     assert record.verdict == "inconclusive"
     assert record.reason.endswith("releases, expected at least 1000000")
     assert world.part().core == CORE.format("Other")
@@ -93,7 +82,7 @@ def test_a_step_puts_the_old_core_back(world: World) -> None:
     """By which a rule of any condition does it."""
     assert _replace(world, "Other", "{probation_s: 60}").success
     assert world.ask(Step("revert_core", "loop")).success
-    record = _decided(world)
+    record = world.decided()
     assert (record.verdict, record.reason) == ("reverted", "a step revert_core")
     assert world.part().core == CORE.format("Loop")
     assert world.ask(Step("revert_core", "loop")).success, "there is nothing to do"
@@ -132,7 +121,7 @@ def test_a_reload_on_probation_goes_back_as_a_whole(world: World, rebuilt: Rebui
     outcome = world.reload("loop", probation="{probation_s: 60}")
     assert outcome.success, outcome.message
     assert "on probation for 60 s" in outcome.message
-    record = _decided(world)
+    record = world.decided()
     assert record.verdict == "reverted", record.reason
     (verdict,) = [
         one for one in ProbationWatch().look(world.runtime.probations()) if one.record.component == "loop"
@@ -153,7 +142,7 @@ def test_a_verdict_that_comes_before_the_reload_ends_leads_back_too(
 
     def commit_late(reload: Reload) -> None:
         if not requests:
-            requests.append(world.control.way_back(Verdict(_decided(world))))
+            requests.append(world.control.way_back(Verdict(world.decided())))
         commit(reload)
 
     monkeypatch.setattr(Reload, "commit", commit_late)
@@ -168,7 +157,7 @@ def test_a_verdict_that_comes_before_the_reload_ends_leads_back_too(
 def test_a_reload_that_passes_stays(world: World, rebuilt: RebuiltPackage) -> None:
     rebuilt.build("STEP=2.0", "NEW_CORE")
     assert world.reload("loop", probation="{probation_s: 0.05}").success
-    assert _decided(world).verdict == "passed"
+    assert world.decided().verdict == "passed"
     assert world.mean_step() == 2.0
 
 
@@ -198,7 +187,7 @@ def test_each_verdict_is_told_once_and_in_its_order() -> None:
 def test_an_earlier_verdict_is_not_that_of_the_reload(world: World, rebuilt: RebuiltPackage) -> None:
     assert _replace(world, "Other", "{probation_s: 60}").success
     assert world.ask(Step("replace_core", "loop", CORE.format("Loop"))).success
-    earlier = Verdict(_decided(world))
+    earlier = Verdict(world.decided())
     assert earlier.record.verdict == "inconclusive"
     rebuilt.build("THROWS", "STEP=2.0", "NEW_CORE")
     assert world.reload("loop", probation="{probation_s: 60}").success

@@ -104,6 +104,48 @@ def test_max_slew_goes_on_over_a_reload(rebuilt: RebuiltPackage, tmp_path: Path)
     assert next(worlds, None) is None
 
 
+def test_an_adopt_that_expects_its_own_build_is_told_of_generations_and_state_fields(
+    world: World, rebuilt: RebuiltPackage
+) -> None:
+    rebuilt.build("ADOPTS")
+    outcome = world.reload()
+    assert outcome.code is Code.ADOPT_REFUSED
+    assert "adopt refused: the adopt of the new core returned false" in outcome.message
+    assert "dynamic_cast of it gives nullptr: name the state in MAUVE_STATE" in outcome.message
+    assert world.generation() == 1
+
+
+def test_refused_reloads_use_up_no_generation_number(world: World, rebuilt: RebuiltPackage) -> None:
+    for macro in ("MISSING", "ADOPTS"):  # refused before it is loaded into this process, and after that
+        rebuilt.build(macro)
+        assert not world.reload().success
+    rebuilt.build("STEP=2.0")
+    outcome = world.reload()
+    assert "generation 2 is in force" in outcome.message
+    assert world.generation() == 2
+    assert world.reload(back=True).success
+    rebuilt.build("STEP=3.0")
+    assert "generation 3 is in force" in world.reload().message, "2 was in force"
+
+
+def test_limits_of_a_probation_name_component_and_output(world: World, rebuilt: RebuiltPackage) -> None:
+    rebuilt.build("CRASH")  # never tried: the limits come first
+    for output, why in (
+        ("twin.total.data", "'twin.total.data' is no output of loop, twin, python"),
+        ("other.sum.data", "known: loop.sum, python.sum, twin.sum"),
+        ("loop.sum.velocity", "found velocity; name the field of a number"),
+    ):
+        limit = f"{{output: {output}, maximum: 1.0}}"
+        outcome = world.reload(probation=f"{{probation_s: 60, revert_on: [{limit}]}}")
+        assert (outcome.code, why in outcome.message) == (Code.INVALID, True), outcome.message
+    rebuilt.build("STEP=2.0")
+    limit = "{output: twin.sum.data, maximum: -1.0}"
+    assert world.reload(probation=f"{{probation_s: 60, revert_on: [{limit}]}}").success
+    record = world.decided()
+    assert (record.component, record.verdict) == ("twin", "reverted")
+    assert record.reason.startswith("output twin.sum.data is ")
+
+
 def test_state_that_does_not_fit_is_told(world: World, rebuilt: RebuiltPackage) -> None:
     rebuilt.build("OTHER_STATE")
     outcome = world.reload()

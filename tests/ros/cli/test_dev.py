@@ -308,6 +308,28 @@ def test_the_commands_of_the_page(
     assert _generation(graph) > 1
 
 
+def test_limits_are_checked_before_anything_is_built(
+    workspace: Workspace, once: Callable[..., subprocess.CompletedProcess[str]], plain: Callable[..., Plain]
+) -> None:
+    for words, why in (
+        (("--revert-on", "overun"), "unknown violation 'overun'; did you mean overrun?"),
+        (("--revert-on", "{output: loop.total.data, maximum: 1}"), "'loop.total.data' is no output of loop"),
+    ):
+        done = once("--probation", "30", *words)
+        assert done.returncode == 2
+        assert why in done.stderr
+        assert not done.stdout
+    assert workspace.builds() == []
+    dev = plain("--probation", "30", "--revert-on", "{output: loop.sum.speed, maximum: 1}")
+    assert dev.process.wait(PATIENCE_S) == 2
+    workspace.save("thousand")
+    assert (
+        once("--probation", "0.2", "--revert-on", "{output: loop.sum.data, minimum: 0}", "nan").returncode
+        == 0
+    )
+    assert workspace.builds() == ["compiling thousand"]
+
+
 def test_once_its_status_tells(
     workspace: Workspace, once: Callable[..., subprocess.CompletedProcess[str]], graph: Any
 ) -> None:

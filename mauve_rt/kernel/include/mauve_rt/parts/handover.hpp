@@ -27,6 +27,8 @@ class Handover {
 
   /// Whether the core to take over from is the one that this was made for. [rt]
   bool is_from(const CoreBase& core) const MAUVE_RT { return &old_ == &core; }
+  /// Whether adopt() and take() of the new core see a core of no known C++ type: the two are of different builds. [non-rt]
+  bool is_between_builds() const noexcept { return stranger_ != nullptr; }
   /// CoreBase::adopt. [rt] as far as the core is.
   bool adopt() const;
   /// Copies the matching fields, then CoreBase::take. [rt] as far as the cores are.
