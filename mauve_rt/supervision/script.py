@@ -10,8 +10,8 @@
 Each line tells of one thing: messages of a topic, named as in the rules; writes to a resource; overruns,
 late wake-ups or responses, executions longer than declared, releases, the state or changes of a component
 (changes of '': of the architecture); the state of a peer; the level of a diagnostic; that the executor's
-Python side works (node: ''); the state of a goal of an action's resource. `value` is that of the field at which a condition looks; counts grow by one
-with each. What is not said does not happen.
+Python side works (node: ''); the state of a goal of an action's resource. `value` is that of the field at
+which a condition looks; counts grow by one with each. What is not said does not happen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -1202,8 +1202,7 @@ TYPED_TEST(RulesOfGoals, AGoalThatTheKernelRejectsIsAFailure) {
 TYPED_TEST(RulesOfGoals, BeginWithTheGoalThatExecutes) {
   this->ask();
   this->accept();
-  this->add_rule(
-      leaf("action", {{"resource", "drive"}, {"is", "overdue"}, {"longer_than_s", 0.05}}));
+  this->add_rule(leaf("action", {{"resource", "drive"}, {"is", "overdue"}, {"longer_than_s", 0.05}}));
   this->deploy();
   this->live(ms_to_ns(70));
   this->begin();

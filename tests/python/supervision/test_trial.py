@@ -140,7 +140,13 @@ def test_goals_of_a_script(tried: TryRules) -> None:
         return {"name": name, "when": when, "do": [core("Safe", name)], "undo": {}}
 
     rules = [on("slow", **{"is": "overdue", "longer_than_s": 4.0}), on("failed", **{"is": "aborted"})]
-    goals = [(1.0, "executing"), (4.0, "succeeded"), (6.0, "executing"), (12.0, "aborted"), (16.0, "executing")]
+    goals = [
+        (1.0, "executing"),
+        (4.0, "succeeded"),
+        (6.0, "executing"),
+        (12.0, "aborted"),
+        (16.0, "executing"),
+    ]
     found = tried(rules, [{"goal": "drive", "is": word, "from_s": at_s} for at_s, word in goals])
     acts = [(round(at_s, 2), name, made) for at_s, name, made in found.story if made in ("do", "undo")]
     assert acts == [

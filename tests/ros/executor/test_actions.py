@@ -16,7 +16,13 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 
 from mauve_msgs.action import DriveTo
-from mauve_msgs.msg import ActionGoal, ArchitectureState, ReconfigurationStep, SupervisorDecision
+from mauve_msgs.msg import (
+    ActionGoal,
+    ArchitectureState,
+    ComponentInfo,
+    ReconfigurationStep,
+    SupervisorDecision,
+)
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
 
 NODE = "/robot_1/executor"
@@ -365,7 +371,7 @@ class Watched:
         newest = self.states[-1].components if self.states else []
         return next((each for each in newest if each.name == component), None)
 
-    def until_shown(self, component: str, **facts: str) -> None:
+    def until_shown(self, component: str, **facts: Any) -> None:
         def is_shown() -> bool:
             shown = self.shows(component)
             return shown is not None and all(getattr(shown, name) == fact for name, fact in facts.items())
@@ -398,6 +404,6 @@ def test_a_rule_stops_a_component_when_a_goal_was_aborted(
     assert watched.rider.result(handle).status == GoalStatus.STATUS_SUCCEEDED
     (handle,) = watched.rider.ask(-1.0)
     assert watched.rider.result(handle).status == GoalStatus.STATUS_ABORTED
-    watched.until_shown("driver", state="STOPPED")
+    watched.until_shown("driver", state=ComponentInfo.STOPPED)
     watched.graph.spin_until(lambda: bool(watched.reasons("do")), "the decision")
     assert watched.reasons("do") == ["a goal of drive is aborted"]
