@@ -1200,11 +1200,11 @@ TYPED_TEST(RulesOfGoals, AGoalThatTheKernelRejectsIsAFailure) {
 }
 
 TYPED_TEST(RulesOfGoals, BeginWithTheGoalThatExecutes) {
-  this->ask();
-  this->accept();
   this->add_rule(leaf("action", {{"resource", "drive"}, {"is", "overdue"}, {"longer_than_s", 0.05}}));
   this->deploy();
-  this->live(ms_to_ns(70));
+  this->ask();
+  this->accept();
+  this->way.run_for(ms_to_ns(70));
   this->begin();
   this->see_once("done");
   EXPECT_EQ("t/Counting", this->present());
