@@ -336,14 +336,21 @@ def test_a_transaction_adds_an_action(serve: Callable[..., Any], graph: Any, par
     assert rider.get(result, "the last result").status == GoalStatus.STATUS_ABORTED
 
 
-WATCHED = SERVER.replace("resources:\n", OTHER.partition("components:\n")[2] + "resources:\n")
+WATCHED = SERVER.replace(
+    "resources:\n",
+    """\
+  counter: {shell: executor_tests/CounterShell, core: executor_tests/Counter, fsm: executor_tests/CounterFsm,
+            alternatives: [executor_tests/Backwards]}
+resources:
+""",
+)
 SLOW = """\
 mauve: 1
 rules:
   - name: watch
     when: {action: {resource: drive, is: overdue, longer_than_s: 0.5}}
     do: [{kind: replace_core, target: counter, name: executor_tests/Backwards}]
-    undo: {}
+    undo: {for_s: 0.1}
 """
 FAILED = """\
 mauve: 1
