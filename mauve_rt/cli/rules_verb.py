@@ -179,7 +179,12 @@ SUB_VERBS = (
         _add_try,
         _try,
     ),
-    Verb("list", "show the state of each rule of an executor", rules_live.add_list, rules_live.list_rules),
+    Verb(
+        "list",
+        "show the state of each rule of an executor or a supervisor",
+        rules_live.add_list,
+        rules_live.list_rules,
+    ),
     Verb("load", "replace the rules of an executor, all or none", rules_live.add_load, rules_live.load_rules),
     Verb(
         "reset",
