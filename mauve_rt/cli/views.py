@@ -43,7 +43,8 @@ def console() -> "Console":
 
     if sys.stdout.isatty():
         return OurConsole(file=beneath(sys.stdout), highlight=False)
-    return OurConsole(file=_Trimmed(beneath(sys.stdout)), highlight=False, width=_WIDE)
+    trimmed: Any = _Trimmed(beneath(sys.stdout))
+    return OurConsole(file=trimmed, highlight=False, width=_WIDE)
 
 
 class _Trimmed:
