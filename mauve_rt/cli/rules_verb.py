@@ -80,7 +80,7 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _held_against(model: "ArchitectureModel | None") -> str:
-    return f", held against {model.path}" if model is not None else ""
+    return f", checked with {model.path}" if model is not None else ""
 
 
 def _complain(file: "RulesFile", problem: Problem, kind: str = "") -> None:
