@@ -1,6 +1,6 @@
 """A Sphinx extension: it writes the generated parts of the pages in docs/reference/.
 
-A page has the lines `<!-- generated: NAME -->` and `<!-- end of NAME -->`. The Markdown of the part NAME takes
+A page has the lines `<!-- generated: NAME -->` and `<!-- end of NAME -->`. The Markdown of the part takes
 the place of both, and of what is between them, when Sphinx reads the page. In the repository it stands there,
 too: `pages.py` writes it, and a test compares it with the sources. Only the pages of the APIs, thousands of
 lines, are not stored: they have the first line alone.
