@@ -10,10 +10,10 @@ namespace {
 
 using Unlocked = py::call_guard<InterpreterUnlocked>;
 
-constexpr auto kSignalNames =
-    std::to_array<std::string_view>({"message", "write", "arrival", "field", "overruns", "late", "release",
-                                     "state", "over_declared", "peer", "diagnostic", "change", "node"});
-static_assert(kSignalNames.size() == static_cast<std::size_t>(rules::SignalKind::node) + 1);
+constexpr auto kSignalNames = std::to_array<std::string_view>(
+    {"message", "write", "arrival", "field", "overruns", "late", "release", "state", "over_declared", "peer",
+     "diagnostic", "change", "node", "goal"});
+static_assert(kSignalNames.size() == static_cast<std::size_t>(rules::SignalKind::goal) + 1);
 constexpr auto kEndings =
     std::to_array<std::string_view>({"done", "refused", "stale", "withdrawn", "timed_out"});
 

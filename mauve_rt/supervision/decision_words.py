@@ -36,6 +36,7 @@ _WORDS: Mapping[str, Words] = {
     "diagnostic": Words("diagnostic '{status}' says {level} or worse", "diagnostic '{status}' is better"),
     "since_change": Words("{of} unchanged for {measured:.2f} s", "{of} has changed"),
     "node_silent": Words("Python silent for {measured:.2f} s", "Python works"),
+    "action": Words("a goal of {of} is {is}", "no goal of {of} is {is}"),
 }
 
 
@@ -109,6 +110,8 @@ def tree_words(when: When, *, name: Name = str) -> str:
     """What a tree waits for."""
     if when.kind not in COMBINATIONS:
         what = str(when.parameters.get("field") or when.kind)
+        if when.kind == "action":
+            what = f"{when.parameters['is']} goal"
         return " ".join(word for word in (what, "of", _target(when, name), _bound(when)) if word)
     parts = [tree_words(part, name=name) for part in when.parts]
     if when.kind == NOT:

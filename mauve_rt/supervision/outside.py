@@ -13,6 +13,7 @@ _INSIDE: Mapping[str, str] = {
     "release": "releases of {target} are known",
     "over_declared": "execution times of {target} are known",
     "node": "the state of the Python side is known",
+    "goal": "the goals of resource {target} are known",
 }
 
 

@@ -34,6 +34,7 @@ _NEVER: Mapping[str, str] = {
     "over_declared": "which executions of {} lasted longer than declared",
     "peer": "what was known of executor {}",
     "node": "whether Python worked{}",
+    "goal": "states of the goals of resource {}: no record has them",
 }
 
 

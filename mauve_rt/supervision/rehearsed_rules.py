@@ -84,6 +84,9 @@ class RehearsedRules:
         self._due_ns = 0
         self.looks = 0  # how often the rules have looked: until the next time they stand as they do
         self._runner.start()
+        for number, signal in enumerate(self.signals):
+            if signal.kind == "goal":  # no goal has come yet: the executor knows that
+                self.tell(number, 0.0)
         self.look()
 
     def tell(self, signal: int, value: float) -> None:

@@ -10,8 +10,8 @@
 Each line tells of one thing: messages of a topic, named as in the rules; writes to a resource; overruns,
 late wake-ups or responses, executions longer than declared, releases, the state or changes of a component
 (changes of '': of the architecture); the state of a peer; the level of a diagnostic; that the executor's
-Python side works (node: ''). `value` is that of the field at which a condition looks; counts grow by one
-with each. What is not said does not happen.
+Python side works (node: ''); the state of a goal of an action's resource. `value` is that of the field at
+which a condition looks; counts grow by one with each. What is not said does not happen.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -45,6 +45,7 @@ _SIGNALS: Mapping[str, tuple[str, ...]] = {
     "diagnostic": ("diagnostic",),
     "change": ("change",),
     "node": ("node",),
+    "goal": ("goal",),
 }
 _COUNTED = ("overruns", "late", "over_declared")
 # The words for values, with their numbers.
@@ -52,7 +53,10 @@ _WORDS: Mapping[str, Mapping[str, int]] = {
     "state": COMPONENT_STATES,
     "peer": {"unheard": 0, "there": 1, "another_instance": 2, "faulted": 3, "gone": 4},
     "diagnostic": {"OK": 0, "WARN": 1, "ERROR": 2, "STALE": 3},
+    "goal": {"executing": 2, "succeeded": 4, "canceled": 5, "aborted": 6},
 }
+# Of a goal: the state in which each signal is 1, by its detail.
+_GOALS: Mapping[str, str] = {"aborted": "aborted", "overdue": "executing"}
 
 
 class Heard(Section):
@@ -77,9 +81,12 @@ class Heard(Section):
     node: str | None = setting(
         Text(), "that the Python side of the executor works; always empty", default=None
     )
+    goal: str | None = setting(
+        Text(), "resource of an action whose goal enters the state of `is`", default=None
+    )
     word: str | None = setting(
         Choice(*dict.fromkeys(each for words in _WORDS.values() for each in words)),
-        "state or level of a `state`, `peer` or `diagnostic`",
+        "state or level of a `state`, `peer`, `diagnostic` or `goal`",
         default=None,
         key="is",
     )
@@ -118,6 +125,12 @@ class Heard(Section):
     def tells(self, signal: SignalSpec) -> bool:
         """Whether a condition that listens to this hears it."""
         return signal.kind in _SIGNALS[self.what] and signal.target == self.of
+
+    def value_for(self, signal: SignalSpec, value: float) -> float:
+        """Return the value that this signal receives of a sample."""
+        if self.goal is None:
+            return value
+        return float(self.word == _GOALS[signal.detail])
 
     def samples(self, end_s: float) -> Iterator[tuple[float, float]]:
         """When it happens, up to and with `end_s`, and the value that is told then."""

@@ -70,7 +70,7 @@ class Trial:
             self._pass_until(at_ns)
             for number, signal in enumerate(self._rules.signals):
                 if one.tells(signal):
-                    self._rules.tell(number, value)
+                    self._rules.tell(number, one.value_for(signal, value))
             self._heard_rows[one.of][self._column()] = "-"
             self._look()
         self._pass_until(self._end_ns)

@@ -6,6 +6,7 @@
 
 #include "mauve_rt/rules/rule_runner.hpp"
 
+#include "data/action_types.hpp"
 #include "hosts.hpp"
 
 namespace mauve::rules::test_rule_runner {
@@ -1113,6 +1114,117 @@ TYPED_TEST(RuleRunnerTest, HearsOfChangesOfTheArchitectureAndOfAComponent) {
   EXPECT_GE(this->whole.back().decision.stamp_ns, changed_ns + ms_to_ns(100));
 }
 
+/// A server of goals, as a component and the bridge see it.
+template <typename Way>
+class RulesOfGoals : public RuleRunnerTest<Way> {
+ protected:
+  RulesOfGoals() { decide.connect(drive.decide, "drive"); }
+  ~RulesOfGoals() override { decide.disconnect(); }
+  void watch(Parameters told) {
+    told["resource"] = std::string("drive");
+    this->add_rule(leaf("action", std::move(told)));
+    this->deploy();
+    this->begin();
+    this->live(ms_to_ns(20));
+    EXPECT_EQ("t/Core", this->present());
+    EXPECT_EQ(Truth::no, this->runner->facts()[0].status.truth);
+  }
+  void ask() { EXPECT_EQ(GoalReason::none, GoalCarrier(drive).ask(++asked, 1, this->host().now_ns())); }
+  /// As a component that reads `status`: the goals that wait for an answer are accepted.
+  void accept() {
+    ActionGoal goal;
+    time_ns_t time_ns = 0;
+    ReaderState reader;
+    drive.status.read(goal, time_ns, reader);
+    EXPECT_EQ(GoalState::executing, goal.its_state());
+  }
+  void end(GoalState state) {
+    EXPECT_TRUE(drive.decide.write(decision(state), this->host().now_ns()));
+    GoalCarrier(drive).take();
+  }
+
+  ActionServer<Walk>& drive{this->architecture.template add_resource<ActionServer<Walk>>("drive", 2)};
+  WritePort<ActionGoal> decide{"decide"};
+  std::uint8_t asked{0};
+};
+TYPED_TEST_SUITE(RulesOfGoals, EveryHost, HostNames);
+
+TYPED_TEST(RulesOfGoals, AGoalIsOverdueUntilItEnds) {
+  this->watch({{"is", "overdue"}, {"longer_than_s", 0.05}});
+  this->ask();
+  this->live(ms_to_ns(70));
+  EXPECT_EQ("t/Core", this->present()) << "no component has accepted the goal";
+  const time_ns_t accepted_ns = this->host().now_ns();
+  this->drive.decide.write(decision(GoalState::accepted), accepted_ns);
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+  EXPECT_GT(this->last(Decided::do_).decision.stamp_ns, accepted_ns + ms_to_ns(50));
+  EXPECT_GT(this->last(Decided::do_).decision.measured, 0.05);
+  this->end(GoalState::succeeded);
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(RulesOfGoals, EachGoalHasItsOwnTime) {
+  this->watch({{"is", "overdue"}, {"longer_than_s", 1.0}});
+  for (int i = 0; i < 4; ++i) {
+    this->ask();
+    this->accept();
+    this->live(ms_to_ns(300));
+    this->end(GoalState::succeeded);
+  }
+  EXPECT_EQ(0, std::count(this->words.begin(), this->words.end(), "do"));
+}
+
+TYPED_TEST(RulesOfGoals, AnAbortedGoalIsAFailureUntilTheNextIsAccepted) {
+  this->watch({{"is", "aborted"}});
+  this->ask();
+  this->accept();
+  this->end(GoalState::aborted);
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+  this->ask();
+  this->live(ms_to_ns(20));
+  EXPECT_EQ("t/Counting", this->present());
+  this->accept();
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
+TYPED_TEST(RulesOfGoals, AGoalThatTheKernelRejectsIsAFailure) {
+  this->watch({{"is", "aborted"}});
+  this->ask();
+  this->drive.poll(this->host().now_ns() + kDefaultAnswerTime);
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+TYPED_TEST(RulesOfGoals, BeginWithTheGoalThatExecutes) {
+  this->add_rule(leaf("action", {{"resource", "drive"}, {"is", "overdue"}, {"longer_than_s", 0.05}}));
+  this->deploy();
+  this->ask();
+  this->accept();
+  this->way.run_for(ms_to_ns(70));
+  this->begin();
+  this->see_once("done");
+  EXPECT_EQ("t/Counting", this->present());
+}
+
+TYPED_TEST(RulesOfGoals, AGoalEndsWithItsResource) {
+  auto& dock = this->architecture.template add_resource<ActionClient<Walk>>("dock");
+  this->add_rule(leaf("action", {{"resource", "dock"}, {"is", "overdue"}, {"longer_than_s", 0.05}}));
+  this->deploy();
+  this->begin();
+  dock.goal.write({1}, this->host().now_ns());
+  dock.answer(1, true, this->host().now_ns());
+  dock.set_state(1, GoalState::executing, this->host().now_ns());
+  this->see("done");
+  EXPECT_EQ("t/Counting", this->present());
+  this->commit_by("test", {{.kind = "remove_resource", .target = "dock"}});
+  this->see("done");
+  EXPECT_EQ("t/Core", this->present());
+}
+
 // ---- what is refused
 
 TYPED_TEST(RuleRunnerTest, RefusesWhatAnExecutorCannotHear) {
@@ -1122,7 +1234,9 @@ TYPED_TEST(RuleRunnerTest, RefusesWhatAnExecutorCannotHear) {
       {leaf("silence", {{"topic", "unbound"}, {"longer_than_s", 1.0}}), "topic unbound"},
       {leaf("silence", {{"resource", "nothing"}, {"longer_than_s", 1.0}}), "nothing"},
       {leaf("fault", {{"component", "nobody"}}), "nobody"},
-      {leaf("value", {{"resource", "beat"}, {"field", "colour"}, {"above", 1.0}}), "colour"}};
+      {leaf("value", {{"resource", "beat"}, {"field", "colour"}, {"above", 1.0}}), "colour"},
+      {leaf("action", {{"resource", "beat"}, {"is", "aborted"}}), "has no goals"},
+      {leaf("action", {{"resource", "nothing"}, {"is", "aborted"}}), "nothing"}};
   this->deploy();
   for (const auto& [when, word] : cases) {
     this->rules.clear();

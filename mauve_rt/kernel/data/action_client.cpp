@@ -32,6 +32,16 @@ std::uint32_t ActionClientBase::open_goal() const {
   return is_open() ? number_ : 0;
 }
 
+GoalsNow ActionClientBase::goals_now() const noexcept {
+  const LockGuard lock(mutex_);
+  GoalsNow now{.is_aborted = is_aborted_};
+  if (state_ == GoalState::executing || state_ == GoalState::canceling) {
+    now.executing = number_;
+    now.accepted_ns = accepted_ns_;
+  }
+  return now;
+}
+
 // ---- under mutex_
 
 void ActionClientBase::begin(time_ns_t time_ns) noexcept {
@@ -46,11 +56,13 @@ void ActionClientBase::begin(time_ns_t time_ns) noexcept {
 void ActionClientBase::enter(GoalState state, GoalReason reason, time_ns_t now_ns) noexcept {
   state_ = state;
   reason_ = reason;
+  is_aborted_ = failed_after(is_aborted_, state, reason);
   changed_ns_ = now_ns;
   ++sequence_;
   switch (state) {
     case GoalState::accepted:
       ++counts_.accepted;
+      accepted_ns_ = now_ns;
       break;
     case GoalState::succeeded:
       ++counts_.succeeded;
@@ -188,7 +200,7 @@ bool ActionClientBase::ask_to_cancel(time_ns_t time_ns) noexcept {
     const LockGuard lock(mutex_);
     cancel_locked(time_ns);
   }
-  notify();
+  decided(time_ns);
   return true;
 }
 
@@ -198,7 +210,7 @@ TryWrite ActionClientBase::try_ask_to_cancel(time_ns_t time_ns) noexcept {
     const LockGuard lock(mutex_, std::adopt_lock);
     cancel_locked(time_ns);
   }
-  notify();
+  decided(time_ns);
   return TryWrite::done;
 }
 

@@ -89,6 +89,16 @@ ActionCounts ActionServerBase::counts() const {
   return counts_;
 }
 
+GoalsNow ActionServerBase::goals_now() const noexcept {
+  const LockGuard lock(mutex_);
+  GoalsNow now{.is_aborted = is_aborted_};
+  if (current_ != kNone) {
+    now.executing = slots_[current_].number;
+    now.accepted_ns = slots_[current_].accepted_ns;
+  }
+  return now;
+}
+
 // ---- slots, under mutex_
 
 std::size_t ActionServerBase::oldest(GoalState state) const noexcept {
@@ -120,6 +130,8 @@ std::size_t ActionServerBase::open_goals() const noexcept {
 
 void ActionServerBase::accept(std::size_t slot, time_ns_t now_ns) noexcept {
   slots_[slot].state = GoalState::accepted;
+  slots_[slot].accepted_ns = now_ns;
+  is_aborted_ = false;
   ++counts_.accepted;
   changed(now_ns);
   if (current_ == kNone) begin_next(now_ns);
@@ -141,6 +153,7 @@ void ActionServerBase::end(std::size_t slot, GoalState state, GoalReason reason,
                          : state == GoalState::aborted  ? counts_.aborted
                                                         : counts_.rejected;
   ++count;
+  is_aborted_ = failed_after(is_aborted_, state, reason);
   changed(now_ns);
   if (slot != current_) return;
   keep_result(slot);
@@ -165,11 +178,11 @@ void ActionServerBase::changed(time_ns_t now_ns) noexcept {
 
 GoalReason ActionServerBase::ask(const GoalId& id, std::span<const std::byte> message, time_ns_t now_ns) {
   if (!take_in(message)) return GoalReason::malformed;
+  GoalReason refused = GoalReason::none;
   {
     const LockGuard lock(mutex_);
     const auto room =
         std::find_if(slots_.begin(), slots_.end(), [](const Slot& slot) { return !slot.is_used; });
-    GoalReason refused = GoalReason::none;
     if (!is_served()) {
       refused = GoalReason::no_server;
     } else if (open_goals() >= goals_ || room == slots_.end() || find(id) != kNone) {
@@ -177,18 +190,20 @@ GoalReason ActionServerBase::ask(const GoalId& id, std::span<const std::byte> me
     }
     if (refused != GoalReason::none) {
       ++counts_.rejected;
-      return refused;
+      if (refused == GoalReason::full) return refused;  // as declared: no failure
+      is_aborted_ = true;
+    } else {
+      *room = {.is_used = true,
+               .id = id,
+               .number = next_number_++,
+               .due_ns = now_ns + answer_ns_,
+               .since_ns = now_ns};
+      keep_goal(static_cast<std::size_t>(room - slots_.begin()));
+      changed(now_ns);
     }
-    *room = {.is_used = true,
-             .id = id,
-             .number = next_number_++,
-             .due_ns = now_ns + answer_ns_,
-             .since_ns = now_ns};
-    keep_goal(static_cast<std::size_t>(room - slots_.begin()));
-    changed(now_ns);
   }
   written(now_ns);
-  return GoalReason::none;
+  return refused;
 }
 
 bool ActionServerBase::cancel(const GoalId& id, time_ns_t now_ns) {
@@ -303,7 +318,7 @@ DataStatus ActionServerBase::read_status(ActionGoal& value, time_ns_t& time_ns,
     time_ns = changed_ns_;
     found = reader.look(sequence_);
   }
-  if (has_accepted) notify();
+  if (has_accepted) decided(time_ns);
   return found;
 }
 
@@ -313,7 +328,7 @@ bool ActionServerBase::take_decision(const ActionGoal& decision, time_ns_t time_
     const LockGuard lock(mutex_);
     fits = decide_locked(decision, time_ns);
   }
-  notify();
+  decided(time_ns);
   return fits;
 }
 
@@ -323,7 +338,7 @@ TryWrite ActionServerBase::try_decision(const ActionGoal& decision, time_ns_t ti
     const LockGuard lock(mutex_, std::adopt_lock);
     decide_locked(decision, time_ns);
   }
-  notify();
+  decided(time_ns);
   return TryWrite::done;
 }
 

@@ -27,7 +27,8 @@
   X(diagnostic)                  \
   X(boolean)                     \
   X(since_change)                \
-  X(node_silent)
+  X(node_silent)                 \
+  X(action)
 
 namespace mauve::rules {
 

@@ -65,6 +65,9 @@ void Feeds::open(const SignalSpec& spec, Signal& signal) {
     case SignalKind::node:
       node_.push_back(&signal);
       return;
+    case SignalKind::goal:
+      feeds_[&signal] = open_goal_feed(spec.target, spec.detail, signal, place_);
+      return;
     case SignalKind::peer:
       refuse("of another executor (" + spec.target + ")");
     case SignalKind::diagnostic:

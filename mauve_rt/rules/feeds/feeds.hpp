@@ -16,6 +16,10 @@ std::unique_ptr<Feed> open_write_feed(const std::string& resource, Heard what, S
 /// Of a number in what is written to a resource. [setup] Throws Error: unknown_resource; invalid_argument: there is none.
 std::unique_ptr<Feed> open_field_feed(const std::string& resource, const std::string& path, Signal& signal,
                                       const FeedPlace& place);
+/// Of the goals of an action: whether the last one was aborted (detail `aborted`), or which one executes (`overdue`).
+/// [setup] Throws Error: unknown_resource; invalid_argument: the resource has no goals.
+std::unique_ptr<Feed> open_goal_feed(const std::string& resource, const std::string& detail, Signal& signal,
+                                     const FeedPlace& place);
 /// Of the changes of the whole architecture. [setup]
 std::unique_ptr<Feed> open_change_feed(Signal& signal, const FeedPlace& place);
 

@@ -77,6 +77,37 @@ TEST_F(ActionClients, SendsAGoalAndReadsWhatBecomesOfIt) {
   EXPECT_EQ(DataStatus::none, result.read().status);
 }
 
+TEST_F(ActionClients, KnowsTheGoalThatExecutesAndWhetherTheLastOneFailed) {
+  const auto now = [&] { return client.goals_now(); };
+  EXPECT_FALSE(now().is_aborted);
+  goal.write({1});
+  next();
+  client.answer(number, true, 5);
+  EXPECT_EQ(0U, now().executing) << "the server has accepted the goal, no more";
+  client.set_state(number, executing, 7);
+  EXPECT_EQ(number, now().executing);
+  EXPECT_EQ(5, now().accepted_ns);
+  client.set_state(number, canceling, 8);
+  EXPECT_EQ(number, now().executing);
+  finish(number, aborted, 0, 9);
+  EXPECT_EQ(0U, now().executing);
+  EXPECT_TRUE(now().is_aborted);
+  goal.write({1});
+  EXPECT_TRUE(now().is_aborted) << "the goal is not accepted yet";
+  next();
+  client.answer(number, false, 10);
+  EXPECT_TRUE(now().is_aborted) << "a rejection by the server's component changes nothing";
+  goal.write({1});
+  next();
+  client.answer(number, true, 11);
+  EXPECT_FALSE(now().is_aborted);
+  client.give_up(number, GoalReason::no_server, 12);
+  EXPECT_TRUE(now().is_aborted);
+  goal.write({1});
+  cancel();
+  EXPECT_FALSE(now().is_aborted) << "the goal was canceled before it was sent";
+}
+
 TEST_F(ActionClients, HasOneGoalAtATime) {
   EXPECT_TRUE(goal.write({1}));
   EXPECT_FALSE(goal.write({2}));

@@ -69,6 +69,74 @@ TEST_F(ActionServers, ExecutesGoalsOneAfterAnother) {
   EXPECT_EQ(1U, counts.aborted);
 }
 
+TEST_F(ActionServers, KnowsTheGoalThatExecutesSinceItsAcceptance) {
+  EXPECT_EQ(0U, server.goals_now().executing);
+  carrier.ask(1, 1, 10);
+  EXPECT_EQ(0U, server.goals_now().executing) << "no component has accepted the goal";
+  carrier.ask(2, 1, 20);
+  EXPECT_EQ(executing, state());
+  EXPECT_EQ(1U, server.goals_now().executing);
+  EXPECT_EQ(10, server.goals_now().accepted_ns);
+  server.cancel(goal_id(1), 30);
+  EXPECT_EQ(1U, server.goals_now().executing) << "the goal is canceling";
+  server.decide.write(decision(canceled), 40);
+  EXPECT_EQ(2U, server.goals_now().executing);
+  EXPECT_EQ(20, server.goals_now().accepted_ns) << "the wait for its turn counts";
+  server.decide.write(decision(succeeded), 50);
+  EXPECT_EQ(0U, server.goals_now().executing);
+}
+
+TEST_F(ActionServers, KnowsThatAGoalWasAbortedUntilOneIsAcceptedOrEndsOtherwise) {
+  const auto is_aborted = [&] { return server.goals_now().is_aborted; };
+  EXPECT_FALSE(is_aborted()) << "before the first goal";
+  carrier.ask(1, 1);
+  carrier.ask(2, 1);
+  EXPECT_EQ(executing, state());
+  decide.write(decision(aborted));
+  EXPECT_TRUE(is_aborted()) << "the next goal was accepted before";
+  decide.write(decision(succeeded));
+  EXPECT_FALSE(is_aborted());
+  carrier.take();
+  carrier.ask(3, 1, 0);
+  server.poll(kAnswer);
+  EXPECT_TRUE(is_aborted()) << "no answer came in time";
+  carrier.take();
+  carrier.ask(4, 1);
+  EXPECT_TRUE(is_aborted()) << "the goal is not accepted yet";
+  EXPECT_EQ(executing, state());
+  EXPECT_FALSE(is_aborted());
+  decide.write(decision(unknown));
+  EXPECT_TRUE(is_aborted()) << "the component was stopped";
+  carrier.take();
+  carrier.ask(5, 1);
+  state();
+  decide.write(decision(canceled));
+  server.cancel(goal_id(5), 0);
+  decide.write(decision(canceled));
+  EXPECT_FALSE(is_aborted());
+  carrier.take();
+  decide.disconnect();
+  EXPECT_EQ(GoalReason::no_server, carrier.ask(6, 1));
+  EXPECT_TRUE(is_aborted());
+}
+
+TEST_F(ActionServers, ARejectionByTheComponentOrForWantOfRoomIsNoFailure) {
+  ReadPort<Walk::Goal> asked{"asked"};
+  asked.connect(server.asked, "walk");
+  carrier.ask(1, 1);
+  decide.write(decision(rejected));
+  EXPECT_FALSE(server.goals_now().is_aborted);
+  carrier.ask(2, 1);
+  carrier.ask(3, 1);
+  EXPECT_EQ(GoalReason::full, carrier.ask(4, 1));
+  EXPECT_FALSE(server.goals_now().is_aborted);
+  decide.write(decision(accepted, 2));
+  decide.write(decision(aborted));
+  decide.write(decision(rejected, 3));
+  EXPECT_TRUE(server.goals_now().is_aborted) << "a rejection ends no failure";
+  asked.disconnect();
+}
+
 TEST_F(ActionServers, RejectsMoreGoalsThanAllowed) {
   EXPECT_EQ(GoalReason::none, carrier.ask(1, 1));
   EXPECT_EQ(GoalReason::none, carrier.ask(2, 1));

@@ -17,6 +17,7 @@ WIDE = ROBOT.replace("components:\n", MORE).replace(
     """\
   told: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: told, direction: publish}}
   lamp: {kind: executor_tests/Lamp}
+  drive: {kind: action_server, type: mauve_msgs/action/DriveTo, action: {name: drive}}
 connections:
   - [eager.set, set.read]""",
 )
@@ -34,6 +35,7 @@ HEARD = {  # by the executor itself
     "boolean": "boolean: {topic: set_point, type: std_msgs/msg/Float64}",
     "since_change": "since_change: {component: eager, longer_than_s: 5}",
     "node_silent": "node_silent: {longer_than_s: 5}",
+    "action": "action: {resource: drive, is: overdue, longer_than_s: 5}",
 }
 OUTSIDE = {
     "peer": "^peer: {executor: robot_2}",
@@ -108,6 +110,12 @@ def test_what_only_the_outside_can_see(check: Check, kind: str) -> None:
             "resource told is of another type",
         ),
         ("^boolean: {topic: set_point}", "expected std_msgs/msg/Float64, found std_msgs/msg/Bool"),
+        # no goals
+        (
+            "^action: {resource: told, is: aborted}",
+            "the resource has no goals: expected an action_server or an action_client, found shared_data",
+        ),
+        ("action: {resource: ^driv, is: aborted}", "resource 'driv' is unknown; did you mean drive?"),
         # no period to miss
         ("^no_release: {component: eager}", "has no period: none of its releases can be missed"),
     ],
@@ -133,6 +141,14 @@ def test_what_the_executor_cannot_hear(check: Check, leaf: str, words: str) -> N
 def test_what_the_supervisor_is_told_wrongly(check: Check, leaf: str, words: str) -> None:
     errors = checked(check, leaf, where="supervisor")
     assert any(error.startswith(place(leaf)) and words in error for error in errors), errors
+
+
+def test_only_the_executor_knows_goals(check: Check) -> None:
+    leaf = "^action: {resource: drive, is: aborted}"
+    for robot in (WIDE, ""):
+        (error,) = checked(check, leaf, where="supervisor", robot=robot)
+        assert error.startswith(f"{place(leaf)}only in the executor the goals of resource drive are known")
+        assert error.endswith("`in: executor`")
 
 
 def test_peers_by_their_namespaces_or_from_there_on_down(check: Check) -> None:

@@ -45,6 +45,10 @@ GOOD = {
         "since_change: {component: control, longer_than_s: 5}",
     ],
     "node_silent": ["node_silent: {}", "node_silent: {longer_than_s: 2}"],
+    "action": [
+        "action: {resource: drive, is: aborted}",
+        "action: {resource: drive, is: overdue, longer_than_s: 5}",
+    ],
 }
 
 BAD = [
@@ -109,6 +113,10 @@ BAD = [
     ("no_release: {component: control, periods: ^0.5}", "greater than or equal to 1.0: found 0.5"),
     ("node_silent: {longer_than_s: ^1}", "greater than or equal to 2.0"),
     ("since_change: {longer_than_s: ^-5}", "greater than or equal to 1e-09"),
+    ("^action: {resource: drive}", "action.is is missing"),
+    ("^action: {resource: drive, is: overdue}", "add longer_than_s"),
+    ("action: {resource: drive, is: aborted, longer_than_s: ^1}", "remove longer_than_s"),
+    ("action: {resource: drive, is: ^late}", "input should be aborted or overdue: found 'late'"),
 ]
 
 

@@ -204,6 +204,10 @@ def test_the_level_of_a_diagnostic_where_it_is_recorded(rules_of: RulesOf, tmp_p
         ("over_declared: {component: c}", "which executions of c lasted longer than declared"),
         ("fault: {component: d}", "component d"),
         ("node_silent: {}", "whether Python worked"),
+        (
+            "action: {resource: drive, is: aborted}",
+            "states of the goals of resource drive: no record has them",
+        ),
         ("no_release: {component: e, periods: 3}", "a period of component e"),
     ],
 )

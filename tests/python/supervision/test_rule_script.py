@@ -25,6 +25,10 @@ TOLD = [
     ("diagnostic: {status: gps}", {"diagnostic": "gps", "is": "ERROR"}, [2.0]),
     ("since_change: {longer_than_s: 1}", {"change": ""}, [0.0]),
     ("since_change: {component: one, longer_than_s: 1}", {"change": "one"}, [0.0]),
+    ("action: {resource: drive, is: aborted}", {"goal": "drive", "is": "aborted"}, [1.0]),
+    ("action: {resource: drive, is: aborted}", {"goal": "drive", "is": "executing"}, [0.0]),
+    ("action: {resource: drive, is: overdue, longer_than_s: 1}", {"goal": "drive", "is": "executing"}, [1.0]),
+    ("action: {resource: drive, is: overdue, longer_than_s: 1}", {"goal": "drive", "is": "aborted"}, [0.0]),
     ("node_silent: {longer_than_s: 2}", {"node": "", "every_s": 1.0}, [0.0, 0.0, 0.0]),
 ]
 
@@ -39,5 +43,5 @@ def test_what_is_told(tmp_path: Path, leaf: str, said: dict[str, object], values
     (condition,) = load(tmp_path, leaf).rules.rules[0].when.leaves()
     signal, *_ = heard(condition)
     assert told.tells(signal)
-    assert [value for _, value in told.samples(2.0)] == values
+    assert [told.value_for(signal, value) for _, value in told.samples(2.0)] == values
     assert not Heard(topic="another").tells(signal)

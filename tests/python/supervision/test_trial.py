@@ -134,6 +134,30 @@ def test_a_fault_that_the_script_tells_of_is_heard(tried: TryRules, where: str) 
     assert found.rows["one"] == "." * 15 + "#" * 45
 
 
+def test_goals_of_a_script(tried: TryRules) -> None:
+    def on(name: str, **what: Any) -> dict[str, Any]:
+        when = {"action": {"resource": "drive", **what}}
+        return {"name": name, "when": when, "do": [core("Safe", name)], "undo": {}}
+
+    rules = [on("slow", **{"is": "overdue", "longer_than_s": 4.0}), on("failed", **{"is": "aborted"})]
+    goals = [
+        (1.0, "executing"),
+        (4.0, "succeeded"),
+        (6.0, "executing"),
+        (12.0, "aborted"),
+        (16.0, "executing"),
+    ]
+    found = tried(rules, [{"goal": "drive", "is": word, "from_s": at_s} for at_s, word in goals])
+    acts = [(round(at_s, 2), name, made) for at_s, name, made in found.story if made in ("do", "undo")]
+    assert acts == [
+        (10.0, "slow", "do"),
+        (12.0, "slow", "undo"),
+        (12.0, "failed", "do"),
+        (16.0, "failed", "undo"),
+    ]
+    assert found.rows["failed"].startswith("."), "before the first goal: false, not unknown"
+
+
 @pytest.mark.parametrize("where", ["executor", "supervisor"])
 def test_what_rules_bring_about_is_heard(tried: TryRules, where: str) -> None:
     when = {"since_change": {"component": "control", "longer_than_s": 2.0}}

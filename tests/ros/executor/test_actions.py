@@ -12,14 +12,22 @@ from action_msgs.msg import GoalStatus
 from action_msgs.srv import CancelGoal
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.action import ActionClient, ActionServer, CancelResponse, GoalResponse
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from std_msgs.msg import Float64
 
 from mauve_msgs.action import DriveTo
-from mauve_msgs.msg import ActionGoal, ReconfigurationStep
+from mauve_msgs.msg import (
+    ActionGoal,
+    ArchitectureState,
+    ComponentInfo,
+    ReconfigurationStep,
+    SupervisorDecision,
+)
 from mauve_msgs.srv import ListComponents, Reconfigure, ReplaceCore, Start, Stop
 
 NODE = "/robot_1/executor"
 DRIVE = "/robot_1/drive"
+LATCHED = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 PORTS = ("status", "goal", "decide", "feedback", "result")
 DRIVER = "{shell: executor_tests/DriverShell, core: executor_tests/Driver, fsm: executor_tests/DriverFsm}"
 SERVER = f"""\
@@ -326,3 +334,76 @@ def test_a_transaction_adds_an_action(serve: Callable[..., Any], graph: Any, par
     reply = graph.ask(Reconfigure, f"{NODE}/reconfigure", steps=steps)
     assert reply.success, reply.message
     assert rider.get(result, "the last result").status == GoalStatus.STATUS_ABORTED
+
+
+WATCHED = SERVER.replace("resources:\n", OTHER.partition("components:\n")[2] + "resources:\n")
+SLOW = """\
+mauve: 1
+rules:
+  - name: watch
+    when: {action: {resource: drive, is: overdue, longer_than_s: 0.5}}
+    do: [{kind: replace_core, target: counter, name: executor_tests/Backwards}]
+    undo: {}
+"""
+FAILED = """\
+mauve: 1
+rules:
+  - name: watch
+    when: {action: {resource: drive, is: aborted}}
+    do: [{kind: stop, target: driver}]
+"""
+
+
+class Watched:
+    """An executor whose rule watches the goals of its action."""
+
+    def __init__(self, start_executor: Callable[..., Any], graph: Any, folder: Path, rules: str) -> None:
+        for name, text in (("robot", WATCHED), ("rules", rules)):
+            (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+        words = [f"architecture:={folder / 'robot.yaml'}", f"rules:={folder / 'rules.yaml'}"]
+        start_executor(*(word for each in words for word in ("-p", each)))
+        self.graph = graph
+        self.decisions = graph.hear(SupervisorDecision, f"{NODE}/decisions", LATCHED)
+        self.states = graph.hear(ArchitectureState, f"{NODE}/state", LATCHED)
+        self.rider = Rider(graph)
+
+    def shows(self, component: str) -> Any:
+        newest = self.states[-1].components if self.states else []
+        return next((each for each in newest if each.name == component), None)
+
+    def until_shown(self, component: str, **facts: Any) -> None:
+        def is_shown() -> bool:
+            shown = self.shows(component)
+            return shown is not None and all(getattr(shown, name) == fact for name, fact in facts.items())
+
+        self.graph.spin_until(is_shown, f"{component}: {facts}")
+
+    def reasons(self, decision: str) -> list[str]:
+        return [each.reason for each in self.decisions if each.decision == decision]
+
+
+def test_a_rule_replaces_a_core_while_a_goal_is_overdue(
+    start_executor: Callable[..., Any], graph: Any, tmp_path: Path, plugin_prefix: Path
+) -> None:
+    watched = Watched(start_executor, graph, tmp_path, SLOW)
+    watched.until_shown("counter", core="executor_tests/Counter")
+    (handle,) = watched.rider.ask(1e9)
+    watched.until_shown("counter", core="executor_tests/Backwards")
+    watched.graph.spin_until(lambda: bool(watched.reasons("do")), "the decision")
+    assert watched.reasons("do") == ["a goal of drive is overdue"]
+    watched.rider.get(handle.cancel_goal_async(), "the answer to a cancel")
+    assert watched.rider.result(handle).status == GoalStatus.STATUS_CANCELED
+    watched.until_shown("counter", core="executor_tests/Counter")
+
+
+def test_a_rule_stops_a_component_when_a_goal_was_aborted(
+    start_executor: Callable[..., Any], graph: Any, tmp_path: Path, plugin_prefix: Path
+) -> None:
+    watched = Watched(start_executor, graph, tmp_path, FAILED)
+    (handle,) = watched.rider.ask(2.0)
+    assert watched.rider.result(handle).status == GoalStatus.STATUS_SUCCEEDED
+    (handle,) = watched.rider.ask(-1.0)
+    assert watched.rider.result(handle).status == GoalStatus.STATUS_ABORTED
+    watched.until_shown("driver", state=ComponentInfo.STOPPED)
+    watched.graph.spin_until(lambda: bool(watched.reasons("do")), "the decision")
+    assert watched.reasons("do") == ["a goal of drive is aborted"]

@@ -25,7 +25,7 @@ namespace mauve {
 ///
 /// | member              | written by                       | read by          | under  |
 /// | ------------------- | -------------------------------- | ---------------- | ------ |
-/// | status_ ... counts_ | component, carrier               | both             | mutex_ |
+/// | number_ ... accepted_ns_ | component, carrier          | both, rules      | mutex_ |
 /// | what a derived class keeps | both                      | both             | mutex_ |
 /// | what it takes in, and hands out | receivers' thread; sender's thread | same | -   |
 /// | floor_              | commits, who deploys             | component        | its own |
@@ -38,6 +38,8 @@ class ActionClientBase : public Resource {
   void set_name(const std::string& name) override;
   /// [non-rt]
   ActionCounts counts() const;
+  /// [rt]
+  GoalsNow goals_now() const MAUVE_RT;
 
   // ---- the carrier of goals (the bridge): one thread sends, one receives
 
@@ -164,6 +166,8 @@ class ActionClientBase : public Resource {
   time_ns_t feedback_ns_{0};
   std::uint32_t result_of_{0};  // the goal whose result is there
   ActionCounts counts_;
+  bool is_aborted_{false};
+  time_ns_t accepted_ns_{0};
 
  public:
   Decide decide{*this};

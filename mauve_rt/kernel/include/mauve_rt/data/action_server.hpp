@@ -50,7 +50,7 @@ struct GoalEvent {
 ///
 /// | member                | written by                             | read by            | under            |
 /// | --------------------- | -------------------------------------- | ------------------ | ---------------- |
-/// | slots_, current_, sequence_, counts_, next_number_ | component, carrier | both      | mutex_           |
+/// | slots_, current_, sequence_, counts_, next_number_, is_aborted_ | component, carrier | both, rules | mutex_ |
 /// | what a derived class keeps of goals, results and feedback | both | both               | mutex_           |
 /// | what it takes in, and hands out | requests' thread; sender's thread | same          | -                |
 /// | floor_                | commits, who deploys                   | component          | its own          |
@@ -65,6 +65,8 @@ class ActionServerBase : public Resource {
   void set_name(const std::string& name) override;
   /// [non-rt]
   ActionCounts counts() const;
+  /// [rt]
+  GoalsNow goals_now() const MAUVE_RT;
 
   // ---- the carrier; asks and cancels on one thread
 
@@ -146,6 +148,7 @@ class ActionServerBase : public Resource {
     GoalState reported{GoalState::unknown};  // the last one that next_event() gave
     time_ns_t due_ns{0};                     // to be answered
     time_ns_t since_ns{0};                   // when it came, or became the current one
+    time_ns_t accepted_ns{0};
   };
 
   /// The services that are the same for all actions, of one port each: one component serves.
@@ -213,6 +216,7 @@ class ActionServerBase : public Resource {
   std::uint64_t sequence_{1};
   time_ns_t changed_ns_{0};
   ActionCounts counts_;
+  bool is_aborted_{false};
   const ServiceBase* asked_{nullptr};  // [setup]
 
  public:

@@ -10,6 +10,7 @@
 #include <type_traits>
 
 #include "mauve_rt/base/rt.hpp"
+#include "mauve_rt/base/time.hpp"
 #include "mauve_rt/data/cdr.hpp"
 
 namespace mauve {
@@ -57,6 +58,24 @@ struct ActionGoal {
   GoalState its_state() const MAUVE_RT { return static_cast<GoalState>(state); }
   GoalReason its_reason() const MAUVE_RT { return static_cast<GoalReason>(reason); }
 };
+
+/// The goals of a server or a client as rules see them.
+struct GoalsNow {
+  bool is_aborted{false};      // see is_failure(); until a goal is accepted, or ends otherwise
+  std::uint32_t executing{0};  // the number of the goal that executes or is canceling; 0: none does
+  time_ns_t accepted_ns{0};    // of that goal
+};
+
+/// Whether a goal ended by a fault: aborted, or rejected by the kernel. [rt]
+constexpr bool is_failure(GoalState state, GoalReason reason) MAUVE_RT {
+  return state == GoalState::aborted || (state == GoalState::rejected && reason != GoalReason::none);
+}
+/// `was_failed` after a goal has come to this state: an answer of a component that rejects the goal changes nothing. [rt]
+constexpr bool failed_after(bool was_failed, GoalState state, GoalReason reason) MAUVE_RT {
+  if (is_failure(state, reason)) return true;
+  return was_failed && state != GoalState::accepted && state != GoalState::succeeded &&
+         state != GoalState::canceled;
+}
 
 /// By which a goal is known on the network.
 using GoalId = std::array<std::uint8_t, 16>;

@@ -67,6 +67,8 @@ class EventListener {
   virtual void on_arrival(time_ns_t /*time_ns*/) MAUVE_RT {}
   /// Who writes what arrives has written all that had arrived by then; under the same lock. [rt] Short, as on_event().
   virtual void on_caught_up(time_ns_t /*until_ns*/) MAUVE_RT {}
+  /// A component has accepted or ended a goal of the resource; under the same lock. [rt] Short, as on_event().
+  virtual void on_decision(time_ns_t /*time_ns*/) MAUVE_RT {}
 };
 
 /// The listeners of one resource, in the order they came; a write without any costs one load.
@@ -95,6 +97,9 @@ class EventListeners {
   /// As call(), of the others of EventListener. [rt]
   void call_arrival(time_ns_t time_ns) MAUVE_RT { call_all(&EventListener::on_arrival, time_ns); }
   void call_caught_up(time_ns_t until_ns) MAUVE_RT { call_all(&EventListener::on_caught_up, until_ns); }
+  void call_decision(time_ns_t time_ns) MAUVE_RT {
+    if (count_.load(std::memory_order_relaxed) != 0) call_all(&EventListener::on_decision, time_ns);
+  }
   /// While who calls this holds it, no listener is called: for what must not be split by a write. [rt] Short.
   PiMutex& mutex() MAUVE_RT { return mutex_; }
 
@@ -273,6 +278,11 @@ class Resource : public ConfigurablePart, public std::enable_shared_from_this<Re
   void written(time_ns_t time_ns) MAUVE_RT {
     notify();
     listeners_.call(time_ns);
+  }
+  /// As written(), of a component's decision about a goal: the wait of the component for an event goes on. [rt]
+  void decided(time_ns_t time_ns) MAUVE_RT {
+    notify();
+    listeners_.call_decision(time_ns);
   }
 
  private:

@@ -32,6 +32,7 @@ enum class SignalKind : std::uint8_t {
   diagnostic,     // of a status by its name: its level
   change,         // of a component, or with no target of the architecture: it was changed
   node,           // of the executor itself: its Python side works; the value means nothing
+  goal,  // of a resource of an action (detail: aborted): 1 or 0; (overdue): the goal that executes, or 0
 };
 
 /// What is known of another executor.
