@@ -63,10 +63,10 @@ def claims(leaf: When, *, negated: bool) -> list[Claim]:
     if "at_least" in told:  # a count of what befell
         return _at_least(_quantity(leaf, but="at_least"), int(told["at_least"]), negated=negated)
     for name in ("longer_than_s", "periods"):  # an age
-        if name in told:
+        if told.get(name) is not None:
             limit, quantity = float(told[name]), _quantity(leaf, but=name)
             return [Claim(quantity, 0, limit) if negated else Claim(quantity, limit, closed=False)]
-    if "is" in told:
+    if "is" in told and "longer_than_s" not in told:  # with both, `is` names one of several facts
         return _is(leaf, negated=negated)
     if "level" in told:
         words = choices(parameters_of(leaf.kind)["level"])

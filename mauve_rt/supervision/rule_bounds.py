@@ -199,7 +199,7 @@ def _age(leaf: When, periods_s: Mapping[str, float], *, negated: bool) -> float 
     if "periods" in told:
         period_s = periods_s.get(str(told.get("component")))
         return None if period_s is None else float(told["periods"]) * period_s
-    return float(told.get("longer_than_s", 0.0))
+    return float(told.get("longer_than_s") or 0.0)
 
 
 def _words(leaf: When) -> str:

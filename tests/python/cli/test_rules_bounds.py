@@ -83,6 +83,7 @@ def test_without_an_architecture_nobody_knows_the_period(check: Check) -> None:
         ("{fault: {component: one}, for_s: 0.5}", 0.5),
         ("{node_silent: {longer_than_s: 5}}", 5.0),
         ("{action: {resource: drive, is: overdue, longer_than_s: 5}}", 5.0),
+        ("{action: {resource: drive, is: aborted}}", 0.0),
         ("{not: {fault: {component: one}, within_s: 0.5}}", 0.5),
         ("{not: {fault: {component: one}, for_s: 0.5}}", 0.0),
         ("{not: {any: [{not: {silence: {topic: in, longer_than_s: 2}}}]}}", 2.0),

@@ -146,7 +146,9 @@ def test_what_the_supervisor_is_told_wrongly(check: Check, leaf: str, words: str
 def test_only_the_executor_knows_goals(check: Check) -> None:
     leaf = "^action: {resource: drive, is: aborted}"
     for robot in (WIDE, ""):
-        (error,) = checked(check, leaf, where="supervisor", robot=robot)
+        text = rule(undo="", when="{action: {resource: drive, is: aborted}}", more="    in: supervisor\n")
+        status, _, (error,) = check(text, robot=robot)
+        assert status == 2
         assert error.startswith(f"{place(leaf)}only in the executor the goals of resource drive are known")
         assert error.endswith("`in: executor`")
 

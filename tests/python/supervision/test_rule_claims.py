@@ -25,6 +25,11 @@ from mauve_rt.yaml.text import read_yaml
         ("since_change: {longer_than_s: 5}", "not: {since_change: {longer_than_s: 4}}"),
         ("silence: {resource: in, longer_than_s: 5}", "not: {silence: {resource: in, longer_than_s: 5}}"),
         ("node_silent: {longer_than_s: 5}", "not: {node_silent: {longer_than_s: 4}}"),
+        ("action: {resource: drive, is: aborted}", "not: {action: {resource: drive, is: aborted}}"),
+        (
+            "action: {resource: drive, is: overdue, longer_than_s: 5}",
+            "not: {action: {resource: drive, is: overdue, longer_than_s: 4}}",
+        ),
         (
             "value: {topic: in, field: x, above: 5}",
             "not: {value: {topic: in, type: std_msgs/msg/Header, field: x, above: 4}}",
@@ -61,6 +66,10 @@ def test_contradictions_of_each_kind(first: str, second: str) -> None:
         ("diagnostic: {status: gps, level: WARN}", "not: {diagnostic: {status: gps}}"),
         ("since_change: {component: one, longer_than_s: 5}", "not: {since_change: {longer_than_s: 4}}"),
         ("silence: {resource: in, longer_than_s: 5}", "not: {silence: {topic: in, longer_than_s: 5}}"),
+        (
+            "action: {resource: drive, is: aborted}",
+            "action: {resource: drive, is: overdue, longer_than_s: 5}",
+        ),
         ("value: {topic: in, field: x, above: 5}", "value: {topic: in, field: y, below: 4}"),
     ],
 )
