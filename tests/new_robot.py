@@ -91,7 +91,7 @@ class NewRobot:
         """Replace the core of the robot that runs; returns the seconds since its package was begun."""
         said = self.mauve("replace-core", "/executor", "drive", f"{self._name}/Halt")
         seconds = time.monotonic() - self._begun_s
-        assert f"component 'drive' runs {self._name}/Halt, before {self._name}/Drive" in said
+        assert f"component 'drive' runs {self._name}/Halt, in place of {self._name}/Drive" in said
         assert "missed releases 0" in said
         assert "took over position" in said
         print(f"{seconds:.1f} s from `mauve new` to the swap, {os.cpu_count()} CPUs")  # noqa: T201 - for the log of the stage

@@ -1,7 +1,9 @@
 """A Sphinx extension: it writes the generated parts of the pages in docs/reference/.
 
-A page has the line `<!-- generated: NAME -->`. The Markdown of the part NAME takes the place of that line
-when Sphinx reads the page. So no generated page is stored, and none can be out of date.
+A page has the lines `<!-- generated: NAME -->` and `<!-- end of NAME -->`. The Markdown of the part takes
+the place of both, and of what is between them, when Sphinx reads the page. In the repository it stands there,
+too: `pages.py` writes it, and a test compares it with the sources. Only the pages of the APIs, thousands of
+lines, are not stored: they have the first line alone.
 """
 
 import re
@@ -11,6 +13,8 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).parents[2]
+PAGES = sorted((ROOT / "docs" / "reference").glob("*.md"))
+_STORED = re.compile(r"^<!-- generated: (\w+) -->\n.*?^<!-- end of \1 -->$", re.MULTILINE | re.DOTALL)
 _MARK = re.compile(r"^<!-- generated: (\w+) -->$", re.MULTILINE)
 
 
@@ -55,12 +59,22 @@ def parts() -> Mapping[str, Callable[[], str]]:
 def setup(app: Any) -> dict[str, bool]:
     """Called by Sphinx: the generated parts are written while the pages are read."""
     known = parts()
-    app.connect("source-read", lambda _app, _name, source: source.__setitem__(0, _filled(source[0], known)))
+    app.connect("source-read", lambda _app, _name, source: source.__setitem__(0, _for_site(source[0], known)))
     return {"parallel_read_safe": True}
 
 
-def _filled(page: str, known: Mapping[str, Callable[[], str]]) -> str:
-    return _MARK.sub(lambda mark: known[mark[1]](), page)
+def filled(page: str, known: Mapping[str, Callable[[], str]]) -> str:
+    """The page with its stored parts as the sources give them."""
+
+    def part(mark: re.Match[str]) -> str:
+        name = mark[1]
+        return f"<!-- generated: {name} -->\n\n{known[name]().strip()}\n\n<!-- end of {name} -->"
+
+    return _STORED.sub(part, page)
+
+
+def _for_site(page: str, known: Mapping[str, Callable[[], str]]) -> str:
+    return _MARK.sub(lambda mark: known[mark[1]](), _STORED.sub(lambda mark: known[mark[1]](), page))
 
 
 if str(ROOT) not in sys.path:

@@ -108,7 +108,7 @@ def _head(runs: Runs) -> str:
         date=time.strftime("%Y-%m-%d", time.gmtime()),
         machine=machine(),
         scheduling="under `SCHED_FIFO`" if real_time else denied,
-        boxes="the processor is theirs" if real_time else "they execute, in turns where they overlap",
+        boxes="the task runs" if real_time else "the task executes, in turns with others where they overlap",
     )
 
 

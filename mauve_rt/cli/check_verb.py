@@ -184,4 +184,4 @@ def _check_rules(path: Path, model: "ArchitectureModel | None", uses: "Uses") ->
 
 
 def _tried_on(model: "ArchitectureModel | None") -> str:
-    return f", tried on {model.path}" if model is not None else ""
+    return f", checked with {model.path}" if model is not None else ""

@@ -80,7 +80,7 @@ def _check(args: argparse.Namespace) -> int:
 
 
 def _held_against(model: "ArchitectureModel | None") -> str:
-    return f", held against {model.path}" if model is not None else ""
+    return f", checked with {model.path}" if model is not None else ""
 
 
 def _complain(file: "RulesFile", problem: Problem, kind: str = "") -> None:
@@ -179,7 +179,12 @@ SUB_VERBS = (
         _add_try,
         _try,
     ),
-    Verb("list", "show the state of each rule of an executor", rules_live.add_list, rules_live.list_rules),
+    Verb(
+        "list",
+        "show the state of each rule of an executor or a supervisor",
+        rules_live.add_list,
+        rules_live.list_rules,
+    ),
     Verb("load", "replace the rules of an executor, all or none", rules_live.add_load, rules_live.load_rules),
     Verb(
         "reset",

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 import sys
 from collections.abc import Sequence
 from datetime import datetime
@@ -17,6 +18,7 @@ if TYPE_CHECKING:  # rich takes its time to load, and JSON or a line of text hav
     from rich.text import Text
 
 _WIDE = 160
+_BLANKS = re.compile(r" +$", re.MULTILINE)
 _WORTH_TELLING_NS = 1_000  # some steps prepare nothing
 
 
@@ -39,7 +41,23 @@ def console() -> "Console":
             """As of any other output: see `pipe`."""
             raise BrokenPipeError
 
-    return OurConsole(file=beneath(sys.stdout), highlight=False, width=None if sys.stdout.isatty() else _WIDE)
+    if sys.stdout.isatty():
+        return OurConsole(file=beneath(sys.stdout), highlight=False)
+    trimmed: Any = _Trimmed(beneath(sys.stdout))
+    return OurConsole(file=trimmed, highlight=False, width=_WIDE)
+
+
+class _Trimmed:
+    """A file that gets no blanks at the ends of lines: tables fill their last column with them."""
+
+    def __init__(self, file: Any) -> None:
+        self._file = file
+
+    def write(self, text: str) -> int:
+        return int(self._file.write(_BLANKS.sub("", text)))
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._file, name)
 
 
 def print_reply(reply: Any, *, as_json: bool, lines: Sequence[str] = ()) -> int:

@@ -54,7 +54,7 @@ def _done(steps: tuple[Step, ...], measured: TransactionReport) -> str:
     step, report = steps[0], measured.steps[0]
     match step.kind:
         case "replace_core":
-            return f"component '{step.target}' runs {report.to_core}, before {report.from_core}"
+            return f"component '{step.target}' runs {report.to_core}, in place of {report.from_core}"
         case "set_property":
             return f"property '{step.name}' of component '{step.target}' is {step.value}"
         case _:

@@ -3,7 +3,8 @@
 from collections.abc import Iterable
 from typing import Any
 
-from mauve_msgs.msg import ComponentInfo, SupervisorDecision
+from mauve_msgs.msg import ComponentInfo, RuleInfo, SupervisorDecision
+from mauve_rt._kernel import RuleStatus
 from mauve_rt.control.requests import Code, Outcome
 from mauve_rt.supervision.decisions import Decision
 from mauve_rt.supervision.inventory import Inventory, ListedComponent
@@ -80,4 +81,23 @@ def decision_message(
         measured=decision.measured,
         took_s=took_s,
         bound_s=bound_s,
+    )
+
+
+def rule_info(name: str, status: RuleStatus, now_ns: int, *, where: str, problem: str) -> Any:
+    """RuleInfo of a rule of which nothing is prepared."""
+    next_ns = status.next_ns
+    return RuleInfo(
+        name=name,
+        where=where,
+        armed=status.armed,
+        holds=status.holds,
+        known=status.known,
+        active=status.active,
+        in_effect=status.in_effect,
+        next=status.next or "",
+        next_in_s=UNKNOWN_S if next_ns is None else max(next_ns - now_ns, 0) / 1e9,
+        since_s=max(now_ns - status.since_ns, 0) / 1e9 if status.armed else 0.0,
+        measured=status.measured,
+        problem=problem,
     )

@@ -3,13 +3,12 @@
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
-from mauve_msgs.msg import RuleInfo
 from mauve_rt._kernel import NOT_MEASURED, RuleFacts, ToldDecision
 from mauve_rt.control.reports import message_of, reports_of
 from mauve_rt.control.requests import Code, Outcome, Request
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.control.wishes import step_of
-from mauve_rt.interfaces.decisions import UNKNOWN_S, decision_message
+from mauve_rt.interfaces.decisions import UNKNOWN_S, decision_message, rule_info
 from mauve_rt.model.steps import Step
 from mauve_rt.supervision.decisions import decision_of
 from mauve_rt.supervision.rule_bounds import Bound, bound_of, reserve_bound_of
@@ -117,26 +116,11 @@ def _what_was_done(rule: Rule, told: ToldDecision) -> str:
     return f"{made.act}: {', '.join(map(str, _steps_of(rule, told)))}"
 
 
-def rule_info(facts: RuleFacts, now_ns: int) -> Any:
+def own_rule_info(facts: RuleFacts, now_ns: int) -> Any:
     """RuleInfo of a rule of the executor's own."""
-    status = facts.status
-    next_ns = status.next_ns
-    return RuleInfo(
-        name=facts.name,
-        where="executor",
-        armed=status.armed,
-        holds=status.holds,
-        known=status.known,
-        active=status.active,
-        in_effect=status.in_effect,
-        ready=facts.ready,
-        next=status.next or "",
-        next_in_s=UNKNOWN_S if next_ns is None else max(next_ns - now_ns, 0) / 1e9,
-        since_s=max(now_ns - status.since_ns, 0) / 1e9 if status.armed else 0.0,
-        measured=status.measured,
-        problem=facts.problem,
-        memory_bytes=facts.memory_bytes,
-    )
+    info = rule_info(facts.name, facts.status, now_ns, where="executor", problem=facts.problem)
+    info.ready, info.memory_bytes = facts.ready, facts.memory_bytes
+    return info
 
 
 def _took_s(told: ToldDecision) -> float:

@@ -145,6 +145,12 @@ class RemoteRules:
             self._arming.on_inventory(now_ns, inventory)
             self._tell()
 
+    def standings(self) -> Iterator[tuple[str, RuleStatus, str]]:
+        """Name and status of each rule, and why it does not act; empty: nothing prevents it."""
+        for each in self._watched:
+            why = each.unobservable or (LEFT_TO_EXECUTOR if each.left else "")
+            yield each.rule.name, self.status(each.number), why
+
     def status(self, number: int) -> RuleStatus:
         """How a rule fares."""
         return self._engine.status(number)

@@ -162,7 +162,7 @@ def test_downstream_core_replaces_a_running_one(
     with installed_executor([program], architecture, mauve=mauve, environment=sourced) as executor:
         assert executor.component()["core"] == "mauve_rt/Float64Relay"
         replaced = executor.mauve("replace-core", "/executor", "relay", "mauve_downstream/Doubler")
-        assert "runs mauve_downstream/Doubler, before mauve_rt/Float64Relay" in replaced
+        assert "runs mauve_downstream/Doubler, in place of mauve_rt/Float64Relay" in replaced
         assert executor.component()["core"] == "mauve_downstream/Doubler"
         executor.wait_for_releases()
         libraries = executor.libraries()

@@ -107,14 +107,17 @@ def test_every_verb_works_or_names_the_remedy(
 ) -> None:
     kept = rebuilt.builds.parent  # all that tests of this session write
     (kept / "home").mkdir(exist_ok=True)
-    (tmp_path / "robot.yaml").write_text(ROBOT, "utf-8")
+    (tmp_path / "wörk").mkdir()
+    folder = tmp_path / "my robot"
+    folder.symlink_to(tmp_path / "wörk")  # everywhere a link, a blank, and a letter beyond ASCII
+    (folder / "robot.yaml").write_text(ROBOT, "utf-8")
     wrapper = _wrapper(place, kept)
     given = {"HOME": str(kept / "home"), "ROS_DOMAIN_ID": str(domain), **place.environment}
     executor = start_executor(
         "-p",
-        f"architecture:={tmp_path}/robot.yaml",
+        f"architecture:={folder}/robot.yaml",
         "-p",
-        f"bags:={tmp_path}",
+        f"bags:={folder}",
         wrapper=wrapper,
         environment=given,
     )
@@ -145,9 +148,11 @@ def test_every_verb_works_or_names_the_remedy(
     else:
         assert reload.returncode == 0, f"{reload.stdout}{reload.stderr}"
         assert str(rebuilt.library) in reload.stdout
+    dev = mauve("dev", NODE, "--build", "true", "--watch", str(folder), "--once")
+    assert (dev.returncode, place.reload_remedy in dev.stdout) == (reload.returncode, True), dev
     works("record", "stop", NODE)
-    works("report", str(tmp_path / "bag"), "--out", str(tmp_path / "report.html"))
-    assert (tmp_path / "report.html").stat().st_size > 0
+    works("report", str(folder / "bag"), "--out", str(folder / "report.html"))
+    assert (folder / "report.html").stat().st_size > 0
     assert "Traceback" not in executor.output
     executor.process.terminate()
     assert executor.process.wait(PATIENCE_S) == 0, executor.output

@@ -494,17 +494,18 @@ void TransactionCommit::Work::throw_refused(const std::string& what) const {
     const int step = draft.core_step != 0 ? draft.core_step : draft.first_step;
     const Handover* handover = change.parts->handover();
     const bool is_between_builds = handover != nullptr && handover->is_between_builds();
-    throw Error(ErrorCode::adopt_refused, "adopt refused: " + what,
-                {.component = draft.name(),
-                 .expected = is_between_builds ? "an adopt that accepts a core of another build" : "",
-                 .found = is_between_builds ? "false, or an exception" : "",
-                 .remedy = is_between_builds
-                               ? "nothing was changed; to adopt, a core of another build has no known C++ type, and "
-                                 "dynamic_cast of it gives nullptr: name the state in MAUVE_STATE, which is copied "
-                                 "between builds, and accept such a core in adopt"
-                               : "nothing was changed; an adopt that throws an exception gives its reason here",
-                 .step = step,
-                 .step_name = text_of(step)});
+    throw Error(
+        ErrorCode::adopt_refused, "adopt refused: " + what,
+        {.component = draft.name(),
+         .expected = is_between_builds ? "an adopt that accepts a core of another build" : "",
+         .found = is_between_builds ? "false, or an exception" : "",
+         .remedy = is_between_builds
+                       ? "nothing was changed; to adopt, a core of another build has no known C++ type, and "
+                         "dynamic_cast of it gives nullptr: name the state in MAUVE_STATE, which is copied "
+                         "between builds, and accept such a core in adopt"
+                       : "nothing was changed; an adopt that throws an exception gives its reason here",
+         .step = step,
+         .step_name = text_of(step)});
   }
   throw Error(ErrorCode::adopt_refused, what);
 }

@@ -9,7 +9,7 @@ from mauve_rt._kernel import Host, RuleActions, RuleFacts, RuleRunner, monotonic
 from mauve_rt.control.judging import Judge, NotSchedulableError, protects
 from mauve_rt.control.runtime import Runtime
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.interfaces.told_decisions import DecisionMessages, rule_info
+from mauve_rt.interfaces.told_decisions import DecisionMessages, own_rule_info
 from mauve_rt.supervision.engine_rules import rule_specs
 from mauve_rt.supervision.rule_actions import own_rules, rule_actions
 from mauve_rt.supervision.rule_hearing import only_outside, own_leaves, unobservable
@@ -79,4 +79,4 @@ class LoadedRules:
     @staticmethod
     def infos(facts: Sequence[RuleFacts]) -> list[Any]:
         """RuleInfo of each."""
-        return [rule_info(each, monotonic_ns()) for each in facts]
+        return [own_rule_info(each, monotonic_ns()) for each in facts]

@@ -23,10 +23,16 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.utilities import try_shutdown
 
 from mauve_msgs.msg import ArchitectureState, ReconfigurationStep, SupervisorDecision
-from mauve_msgs.srv import ListComponents, Reconfigure, WriteSnapshot
+from mauve_msgs.srv import ListComponents, ListRules, Reconfigure, WriteSnapshot
 from mauve_rt.control.requests import Request
 from mauve_rt.errors import ArchitectureFileError
-from mauve_rt.interfaces.decisions import architecture_view, decision_message, inventory, outcome_of
+from mauve_rt.interfaces.decisions import (
+    architecture_view,
+    decision_message,
+    inventory,
+    outcome_of,
+    rule_info,
+)
 from mauve_rt.interfaces.outside_feeds import Kept, OutsideFeeds
 from mauve_rt.node.shared.announcement import first_participant
 from mauve_rt.node.shared.background_console import init_logging_apart, last_lines
@@ -84,6 +90,7 @@ class Supervisor:
         self._timer = node.create_timer(
             _LONGEST_S, watch.guarded("the rules", self._tick), clock=Clock(clock_type=ClockType.STEADY_TIME)
         )
+        node.create_service(ListRules, "~/list_rules", self._list_rules)
         self._feeds = OutsideFeeds(rules_file, self._rules, listen=self._listen, now_ns=time.monotonic_ns)
         self._listen(f"{executor}/state", ArchitectureState, self._on_state, raw=False, kept="all")
 
@@ -140,6 +147,14 @@ class Supervisor:
 
     def _on_state(self, state: Any) -> None:
         self._rules.on_state(time.monotonic_ns(), architecture_view(state))
+
+    def _list_rules(self, _request: Any, reply: Any) -> Any:
+        now_ns = time.monotonic_ns()
+        reply.rules = [
+            rule_info(name, status, now_ns, where=NODE_NAME, problem=problem)
+            for name, status, problem in self._rules.standings()
+        ]
+        return reply
 
     def _look(self) -> None:
         if self._list.service_is_ready():  # if not, the engine looks again

@@ -1,16 +1,23 @@
-"""Which files a bag consists of."""
+"""Which files a bag consists of: what metadata.yaml names, and what its recorder begins or deletes."""
 
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
+from mauve_rt.trace.bag.read_metadata import file_names, read_metadata
 from mauve_rt.trace.errors import TraceError
 
 MCAP, SQLITE = ".mcap", ".db3"
 SUFFIXES = (MCAP, SQLITE)
 """Of the files of a bag; where a folder has both, the first counts."""
+_NUMBERED = re.compile(r"(.*)_(\d+)")
 
 
 def bag_files(path: Path) -> list[Path]:
     """Return the files of a bag in their order: MCAP files, or sqlite3's.
+
+    Other files may lie in the folder, such as the copy that `mcap compress` writes. Where metadata.yaml names
+    none of those that are there, all are of the bag.
 
     Raises:
         TraceError: there is none; says what is there instead.
@@ -18,11 +25,47 @@ def bag_files(path: Path) -> list[Path]:
     """
     if path.is_file() and path.suffix in SUFFIXES:
         return [path]
+    found = _found(path)
+    if found:
+        return _own(path, found) or found
+    msg = f"bag {path}: expected a rosbag2 folder with MCAP files; {_instead(path)}"
+    raise TraceError(msg)
+
+
+def other_files(path: Path) -> list[Path]:
+    """Return the files in a bag's folder that look like files of a bag, and are none of this one."""
+    own = {*bag_files(path)}
+    return [file for file in _found(path) if file not in own]
+
+
+def _found(path: Path) -> list[Path]:
     for suffix in SUFFIXES if path.is_dir() else ():
         if found := list(path.glob(f"*{suffix}")):
             return sorted(found, key=lambda file: (len(file.name), file.name))
-    msg = f"bag {path}: expected a rosbag2 folder with MCAP files; {_instead(path)}"
-    raise TraceError(msg)
+    return []
+
+
+def _own(path: Path, found: Sequence[Path]) -> list[Path]:
+    """Files that are named, the next one, not named yet, and older ones, named no longer."""
+    try:
+        names = {*file_names(read_metadata(path))}
+    except TraceError:
+        return []
+    numbers: dict[str, list[int]] = {}
+    for name in names:
+        if match := _NUMBERED.fullmatch(Path(name).stem):
+            numbers.setdefault(match[1], []).append(int(match[2]))
+
+    def is_own(file: Path) -> bool:
+        if file.name in names:
+            return True
+        match = _NUMBERED.fullmatch(file.stem)
+        if match is None or match[1] not in numbers:
+            return False
+        named = numbers[match[1]]
+        return int(match[2]) == max(named) + 1 or int(match[2]) < min(named)
+
+    return [file for file in found if is_own(file)]
 
 
 def is_bag_folder(path: Path) -> bool:

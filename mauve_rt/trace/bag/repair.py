@@ -11,15 +11,13 @@ from typing import Any
 from mauve_rt.counts import counted
 from mauve_rt.trace.bag.deletion import deleted_of
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata
-from mauve_rt.trace.bag.files import bag_files, is_sqlite
+from mauve_rt.trace.bag.files import bag_files, is_sqlite, other_files
 from mauve_rt.trace.bag.mcap_repair import FileState, examine
 from mauve_rt.trace.bag.metadata import BagFileCounts, BagTopic, metadata_text, named_files
+from mauve_rt.trace.bag.read_metadata import file_names, read_metadata
 from mauve_rt.trace.errors import TraceError
 from mauve_rt.trace.progress import Progress, part, silent
 from mauve_rt.yaml.text import YamlError, read_yaml
-
-_INFORMATION = "rosbag2_bagfile_information"
-_MAX_METADATA_BYTES = 64_000_000  # of hundreds of thousands of files
 
 
 @dataclass(frozen=True)
@@ -36,6 +34,8 @@ class BagState:
     """Files of which nothing can be read, beside others, and why."""
     removed: tuple[Path, ...] = ()
     """Files that the recorder took out of the bag for its size, and a kill came before it deleted them."""
+    others: tuple[Path, ...] = ()
+    """Files of another bag that lie in the folder: they are not read."""
 
     @property
     def is_finished(self) -> bool:
@@ -83,10 +83,11 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
         return BagState(path, tuple(states), "", custom_data, {})
     if not custom_data:
         with contextlib.suppress(TraceError):
-            custom_data = _custom_data(_read_metadata(path))
+            custom_data = _custom_data(read_metadata(path))
     removed = _removed(path, states, custom_data)
     states = [state for state in states if state.path not in removed]
-    return BagState(path, tuple(states), _metadata_damage(path, states), custom_data, unreadable, removed)
+    damage, others = _metadata_damage(path, states), tuple(other_files(path))
+    return BagState(path, tuple(states), damage, custom_data, unreadable, removed, others)
 
 
 def repair_bag(state: BagState) -> None:
@@ -128,25 +129,20 @@ def _removed(path: Path, states: Sequence[FileState], custom_data: Mapping[str, 
     if deleted is None:
         return ()
     try:
-        named = _names(_read_metadata(path))
+        named = file_names(read_metadata(path))
     except TraceError:
         return ()
     files = [state.path for state in states]
     return tuple(file for file in files if deleted.is_of(file.name) and named and file.name not in named)
 
 
-def _names(metadata: Mapping[str, Any]) -> list[str]:
-    listed = metadata.get("relative_file_paths")
-    return [Path(str(name)).name for name in listed] if isinstance(listed, list) else []
-
-
 def _metadata_damage(path: Path, files: Sequence[FileState]) -> str:
     """Tell where metadata.yaml promises other than the files hold."""
     try:
-        told = _read_metadata(path)
+        told = read_metadata(path)
     except TraceError as error:
         return str(error)
-    names = _names(told)
+    names = file_names(told)
     found = [file.name for file in _named(files)]
     if names != found:
         return f"names the files {', '.join(names) or '(none)'}, there are {', '.join(found)}"
@@ -160,33 +156,9 @@ def _named(files: Sequence[FileState]) -> Sequence[BagFileCounts]:
     return named_files([BagFileCounts(file.path.name, file.counts) for file in files])
 
 
-def _read_metadata(path: Path) -> Mapping[str, Any]:
-    """Return what rosbag2 wrote.
-
-    Raises:
-        TraceError: it is not there, or is something else; says only that.
-
-    """
-    try:
-        with (path / METADATA).open("rb") as file:
-            raw = file.read(_MAX_METADATA_BYTES + 1)
-        read = read_yaml(raw.decode("utf-8"), max_bytes=_MAX_METADATA_BYTES)
-    except FileNotFoundError as error:
-        msg = "not there"
-        raise TraceError(msg) from error
-    except (OSError, UnicodeDecodeError, YamlError) as error:
-        msg = f"cannot be read ({str(error).splitlines()[0]})"
-        raise TraceError(msg) from error
-    told = read.get(_INFORMATION) if isinstance(read, dict) else None
-    if not isinstance(told, dict):
-        msg = f"has no {_INFORMATION}"
-        raise TraceError(msg)
-    return told
-
-
 def _write_metadata(state: BagState) -> None:
     try:
-        before = _read_metadata(state.path)
+        before = read_metadata(state.path)
     except TraceError:
         before = {}
     text = metadata_text(

@@ -9,6 +9,7 @@ import numpy as np
 
 from mauve_rt.counts import counted
 from mauve_rt.trace.bag.deletion import deleted_of
+from mauve_rt.trace.bag.disk import METADATA
 from mauve_rt.trace.bag.files import is_sqlite
 from mauve_rt.trace.bag.repair import BagState, examine_bag
 from mauve_rt.trace.format.records import Kind
@@ -81,7 +82,7 @@ def check_bag(path: Path, *, progress: Progress = silent) -> list[Finding]:
     if (snapshot := snapshot_of(state.custom_data)) is not None:
         torn = "" if snapshot.is_complete else "; the bag has its begin only: the executor or its disk failed"
         found.append(Finding(f"{snapshot.text}{torn}", is_loss=bool(torn)))
-    found += [Finding(text) for text in _deleted(state)]
+    found += [Finding(text) for text in (*_deleted(state), *_others(state))]
     return found + _notes(trace) + [Finding(text) for text in _not_known(ledger)]
 
 
@@ -136,6 +137,11 @@ def _deleted(state: BagState) -> Iterator[str]:
             f"{path.name}: no longer part of the bag: max_size_bytes removed it, and the recorder ended "
             f"before it deleted the file. Delete it: mauve trace repair {state.path}"
         )
+
+
+def _others(state: BagState) -> Iterator[str]:
+    for path in state.others:
+        yield f"{path.name}: no file of this bag: {METADATA} does not name it. It is not read"
 
 
 def _missing(state: BagState, ledger: Mapping[str, Entry]) -> Iterator[str]:

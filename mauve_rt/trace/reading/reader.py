@@ -1,7 +1,7 @@
 """Reads a recorded trace back by the definitions stored in the bag; needs no message package.
 
 Files are read from their begin and not by their summary, so that the bag of a recorder that runs, or that was
-killed, gives all it has. metadata.yaml is not consulted: the files tell the same, and are never older.
+killed, gives all it has. Of metadata.yaml only the names of the files count: what they hold is never older.
 """
 
 import re

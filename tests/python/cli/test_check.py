@@ -104,7 +104,7 @@ def test_a_steps_file_by_itself(check: Check) -> None:
 
 def test_steps_in_a_file_with_settings_are_a_steps_file_too(check: Check) -> None:
     whole = "force: true\nsteps:\n" + STEPS
-    good = "steps: 3 steps, tried on robot: no error found"
+    good = "steps: 3 steps, checked with robot: no error found"
     status, out, errors = check(robot=ROBOT, steps=whole)
     assert (status, out[1:], errors) == (0, [good], [])
     (error,) = check(robot=ROBOT, steps=whole.replace("one, name: count", "two, name: count"))[2]
@@ -125,7 +125,7 @@ def test_steps_in_a_file_with_settings_are_a_steps_file_too(check: Check) -> Non
 def test_steps_beside_an_architecture_are_tried_on_it(
     check: Check, old: str, new: str, line: int, words: str
 ) -> None:
-    good = "steps: 3 steps, tried on robot: no error found"
+    good = "steps: 3 steps, checked with robot: no error found"
     status, out, errors = check(steps=STEPS, robot=ROBOT)  # in any order
     assert (status, out[1:], errors) == (0, [good], [])
     status, out, errors = check(robot=ROBOT, steps=STEPS.replace(old, new, 1))
@@ -147,7 +147,7 @@ def test_rules_beside_an_architecture_do_and_undo(
     check: Check, old: str, new: str, line: int, words: str
 ) -> None:
     status, out, errors = check(robot=ROBOT, rules=RULES)
-    assert (status, out[1:], errors) == (0, ["rules: 1 rule, tried on robot: no error found"], [])
+    assert (status, out[1:], errors) == (0, ["rules: 1 rule, checked with robot: no error found"], [])
     status, out, errors = check(robot=ROBOT, rules=RULES.replace(old, new, 1))
     assert (status, len(out)) == (2, 1)
     (error,) = errors

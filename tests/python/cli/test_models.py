@@ -166,8 +166,8 @@ def test_rules_and_steps_are_tried_with_a_model(model: Path, capfd: pytest.Captu
     files = [path, str(rules), str(steps), str(model)]
     assert main(["check", *files]) == 0, capfd.readouterr().err
     told = capfd.readouterr().out
-    assert f"{steps}: 2 steps, tried on {path}: no error found" in told
-    assert f"{rules}: 1 rule, tried on {path}: no error found" in told
+    assert f"{steps}: 2 steps, checked with {path}: no error found" in told
+    assert f"{rules}: 1 rule, checked with {path}: no error found" in told
     assert main(["graph", path, str(model), "--steps", str(steps)]) == 0
     assert "StraightGuidance" in capfd.readouterr().out
 

@@ -194,7 +194,7 @@ def test_releases_that_were_missed_are_in_the_message() -> None:
     two = SimpleNamespace(component="a", missed_releases=2, remark="its new grid began later")
     unknown = SimpleNamespace(component="b", missed_releases=NOT_MEASURED)
     measured: Any = SimpleNamespace(steps=[nothing], prepare_ns=0, blackout_ns=0, is_idle=False)
-    assert message_of(steps[:1], measured) == "component 'a' runs p/B, before p/A"
+    assert message_of(steps[:1], measured) == "component 'a' runs p/B, in place of p/A"
     measured.steps = [two, two, unknown]
     done = "3 steps are in force; prepared in 0 ms"
     assert (

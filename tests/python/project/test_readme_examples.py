@@ -77,7 +77,7 @@ def test_the_steps_fit_the_mission(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "mauve_rt.cli", "check", ROBOT, steps]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
-    assert f"{steps}: 2 steps, tried on {ROBOT}: no error found" in done.stdout
+    assert f"{steps}: 2 steps, checked with {ROBOT}: no error found" in done.stdout
 
 
 def test_the_pieces_of_architecture_files_are_accepted(tmp_path: Path) -> None:

@@ -110,6 +110,16 @@ def test_no_package_is_needed_but_those_of_docs_txt() -> None:
     assert json.loads(done.stdout) == _parts()
 
 
+def test_the_pages_in_the_repository_have_what_the_sources_say() -> None:
+    code = (
+        "from _reference import PAGES, filled, parts; known = parts(); "
+        "texts = {page: page.read_text('utf-8') for page in PAGES}; "
+        "print(*[page.name for page, text in texts.items() if filled(text, known) != text])"
+    )
+    done = _python(code)
+    assert (done.stderr, done.stdout.strip()) == ("", ""), "run python docs/_reference/pages.py"
+
+
 def test_the_stub_has_the_tables_of_the_kernel() -> None:
     module = runpy.run_path(str(ROOT / "docs" / "_reference" / "kernel_tables.py"))
     present = json.loads(json.dumps(module["tables"]()))

@@ -51,7 +51,7 @@ def test_verbs_do_what_they_say(mauve: Mauve) -> None:
     assert "counter" in listed.stdout
     replaced = mauve("replace-core", NODE, "counter", "executor_tests/Backwards", "--cause", "for a test")
     assert replaced.returncode == 0, replaced.stderr
-    assert "runs executor_tests/Backwards, before executor_tests/Counter" in replaced.stdout
+    assert "runs executor_tests/Backwards, in place of executor_tests/Counter" in replaced.stdout
     assert "missed releases 0, next release due" in replaced.stdout
     at_once = mauve("replace-core", NODE, "counter", "executor_tests/Backwards", "--phase-timeout", "0")
     assert at_once.returncode == 0, at_once.stderr

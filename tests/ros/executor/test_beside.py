@@ -46,7 +46,7 @@ def test_stop_start_and_list_wait_for_no_preparation(
     assert [(reply.success, reply.message) for reply in replies] == [
         (True, "component 'sleepy' is stopped"),
         (True, "component 'sleepy' is started"),
-        (True, f"component 'counter' runs {PATIENT}, before executor_tests/Counter"),
+        (True, f"component 'counter' runs {PATIENT}, in place of executor_tests/Counter"),
     ]
     revisions = [reply.revision for reply in replies]
     assert revisions == sorted(set(revisions))

@@ -210,7 +210,7 @@ def test_acts_undoes_and_tells(start: Start, graph: Any):
     assert done.act == "do"
     assert done.took_s > 0, "a release came after"
     assert done.bound_s > 0
-    assert done.message == f"component 'counter' runs {SAFE}, before {USUAL}"
+    assert done.message == f"component 'counter' runs {SAFE}, in place of {USUAL}"
     cause = f"quiet: {do.reason}"
     graph.spin_until(lambda: any(event.cause == cause for event in events), "the event")
     event = next(event for event in events if event.cause == cause)

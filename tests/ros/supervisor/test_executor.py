@@ -113,9 +113,14 @@ class Band:
             self.spinner.spin_once(timeout_sec=0.1)
 
     def report(self) -> str:
-        """What is known, for who reads a failure."""
-        executor = self.executor_process
+        """What is known, for who reads a failure. Ends the supervisor: what it wrote to stderr counts."""
+        executor, supervisor = self.executor_process, self.supervisor_process
         ended = f"; the executor ended: {executor.communicate()[1]}" if executor.poll() is not None else ""
+        publishers = self.node.count_publishers("/band/supervisor/decisions")
+        status = supervisor.poll()
+        supervisor.kill()
+        ended += f"; {publishers} supervisors publish decisions; the last one's status is {status}"
+        ended += f", it wrote: {supervisor.communicate()[1]}"
         decided = [f"{decision.decision} ({decision.reason})" for decision in self.decisions]
         return f"decisions: {decided}; instances: {[state.instance_id for state in self.states]}{ended}"
 

@@ -188,6 +188,24 @@ def test_a_silent_peer_leads_to_the_swap_and_its_return_to_the_swap_back(graph: 
     assert do.stamp.sec > 0
 
 
+def test_the_command_lists_the_rules_of_a_supervisor(graph: Graph, rules: Path, tmp_path: Path):
+    stand_in, decisions = supervised(graph, rules)
+    stand_in.talking = False
+    graph.until(lambda: "done" in said(decisions))
+    command = [sys.executable, "-m", "mauve_rt.cli", "rules", "list", "/robot_1/supervisor"]
+    environment = {**os.environ, "ROS_DOMAIN_ID": str(graph.context.get_domain_id())}
+    with (tmp_path / "out").open("w+", encoding="utf-8") as out:
+        process = subprocess.Popen(command, env=environment, stdout=out, text=True)
+        graph.until(lambda: process.poll() is not None)
+        assert process.returncode == 0
+        out.seek(0)
+        listed = out.read()
+    (row,) = [line.split() for line in listed.splitlines() if line.lstrip().startswith("link_lost")]
+    assert row[:3] == ["link_lost", "yes", "true"]
+    assert "in effect" in listed
+    assert not [line for line in listed.splitlines() if line != line.rstrip()], "blanks at the end of a line"
+
+
 def test_a_rule_asks_the_executor_for_a_snapshot_when_its_action_begins(graph: Graph, rules: Path):
     rules.write_text(f"{RULES.rstrip()}\n    snapshot: true\n", encoding="utf-8")
     stand_in, decisions = supervised(graph, rules)

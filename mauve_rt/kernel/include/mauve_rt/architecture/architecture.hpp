@@ -42,7 +42,7 @@ struct TraceDrain {
   time_ns_t realtime_ns{0};
 };
 
-/// From the instant that all threads are ready at to the epoch, however many they are (rule 5).
+/// Delay from the moment when all threads are ready to the epoch (rule 5).
 inline constexpr time_ns_t kDeploymentLead = ms_to_ns(20);
 
 /// What an architecture consists of.

@@ -81,7 +81,8 @@ struct ProbationRecord {
   std::string to_core{};
   ProbationVerdict verdict{ProbationVerdict::running};
   ProbationCause cause{ProbationCause::none};
-  std::string reason{};  // in words: "output control.cmd.linear.x is nan"; empty while it runs, and when it passed
+  std::string
+      reason{};  // in words: "output control.cmd.linear.x is nan"; empty while it runs, and when it passed
   std::int64_t releases{0};  // of the new core, each up to its next wait
   time_ns_t begin_ns{0};
   time_ns_t end_ns{0};  // when it was decided; while it runs: when it is over
