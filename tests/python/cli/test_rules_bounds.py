@@ -29,7 +29,7 @@ def loaded(folder: Path, when: str, do: str = SWAP, more: str = "", name: str = 
 def test_in_the_executor(check: Check) -> None:
     status, out, errors = check(rule(more="    for_s: 0.25\n", undo=BACK), robot=ROBOT)
     assert (status, errors) == (0, [])
-    assert out[-1] == "rules: 1 rule, held against robot: no error found"
+    assert out[-1] == "rules: 1 rule, checked with robot: no error found"
     assert parts(out) == {
         "silence set_point": 1000.0,
         "for_s of the rule": 250.0,
