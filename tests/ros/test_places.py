@@ -3,6 +3,7 @@
 import os
 import shlex
 import subprocess
+import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,7 @@ from mauve_rt import _kernel
 from mauve_rt.parts.ament_index import share_folder
 
 PREFIX = Path(_kernel.__file__).resolve().parents[4]
+PROGRAMS = (PREFIX, Path(sys.prefix))
 NODE = "/robot_1/executor"
 ROBOT = """\
 mauve: 1
@@ -75,16 +77,22 @@ PLACES = {
 
 
 def _wrapper(place: Place, kept: Path) -> tuple[str, ...]:
-    """A wrapper that makes the place in a mount namespace; `kept` is as everywhere else, also below /tmp."""
-    keep = shlex.quote(str(kept))
-    steps = ["mount --make-rprivate /", "mount -t tmpfs none /mnt", "mkdir /mnt/kept"]
-    steps += [f"mount --bind {keep} /mnt/kept"]
+    """A wrapper that makes the place in a mount namespace.
+
+    `kept` is as everywhere else, also below /tmp; as are the programs, where the clone is there.
+    """
+    steps = ["mount --make-rprivate /", "mount -t tmpfs none /mnt"]
+    keeping = {f"/mnt/{number}": folder for number, folder in enumerate((kept, *PROGRAMS))}
+    for at, folder in keeping.items():
+        steps += [f"mkdir {at}", f"mount --bind {shlex.quote(str(folder))} {at}"]
     for name, (options, command) in place.folders.items():
-        folder = shlex.quote(name.format(home=kept / "home"))
-        steps += [f"mkdir -p {folder}", f"mount -t tmpfs -o mode=1777,{options} none {folder}"]
-        if kept.is_relative_to(name):
-            steps += [f"mkdir -p {keep}", f"mount --bind /mnt/kept {keep}"]
-        steps.append(command.format(folder))
+        mounted = shlex.quote(name.format(home=kept / "home"))
+        steps += [f"mkdir -p {mounted}", f"mount -t tmpfs -o mode=1777,{options} none {mounted}"]
+        for at, folder in keeping.items():
+            if folder.is_relative_to(name):
+                keep = shlex.quote(str(folder))
+                steps += [f"mkdir -p {keep}", f"mount --bind {at} {keep}"]
+        steps.append(command.format(mounted))
     return ("unshare", "-m", "sh", "-c", f'{" && ".join([*steps, place.also])} && exec "$@"', "sh")
 
 

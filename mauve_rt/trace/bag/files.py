@@ -23,26 +23,26 @@ def bag_files(path: Path) -> list[Path]:
         TraceError: there is none; says what is there instead.
 
     """
-    if path.is_file() and path.suffix in SUFFIXES:
-        return [path]
+    return own_and_other_files(path)[0]
+
+
+def own_and_other_files(path: Path) -> tuple[list[Path], list[Path]]:
+    """As bag_files(); and the files in its folder that look like files of a bag, and are none of this one."""
     found = _found(path)
-    if found:
-        return _own(path, found) or found
-    msg = f"bag {path}: expected a rosbag2 folder with MCAP files; {_instead(path)}"
-    raise TraceError(msg)
-
-
-def other_files(path: Path) -> list[Path]:
-    """Return the files in a bag's folder that look like files of a bag, and are none of this one."""
-    own = {*bag_files(path)}
-    return [file for file in _found(path) if file not in own]
+    if path.is_dir() and (own := _own(path, found)):
+        return own, [file for file in found if file not in own]
+    return found, []
 
 
 def _found(path: Path) -> list[Path]:
+    """The file itself, or all files in the folder of the first kind that is there."""
+    if path.is_file() and path.suffix in SUFFIXES:
+        return [path]
     for suffix in SUFFIXES if path.is_dir() else ():
         if found := list(path.glob(f"*{suffix}")):
             return sorted(found, key=lambda file: (len(file.name), file.name))
-    return []
+    msg = f"bag {path}: expected a rosbag2 folder with MCAP files; {_instead(path)}"
+    raise TraceError(msg)
 
 
 def _own(path: Path, found: Sequence[Path]) -> list[Path]:
@@ -80,7 +80,7 @@ def is_sqlite(path: Path) -> bool:
         TraceError: it is no bag.
 
     """
-    return bag_files(path)[0].suffix == SQLITE
+    return _found(path)[0].suffix == SQLITE
 
 
 def _instead(path: Path) -> str:

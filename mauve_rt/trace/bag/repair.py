@@ -11,7 +11,7 @@ from typing import Any
 from mauve_rt.counts import counted
 from mauve_rt.trace.bag.deletion import deleted_of
 from mauve_rt.trace.bag.disk import METADATA, Disk, Metadata
-from mauve_rt.trace.bag.files import bag_files, is_sqlite, other_files
+from mauve_rt.trace.bag.files import is_sqlite, own_and_other_files
 from mauve_rt.trace.bag.mcap_repair import FileState, examine
 from mauve_rt.trace.bag.metadata import BagFileCounts, BagTopic, metadata_text, named_files
 from mauve_rt.trace.bag.read_metadata import file_names, read_metadata
@@ -64,7 +64,7 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
     if is_sqlite(path):
         msg = f"bag {path}: its storage is sqlite3; only MCAP files are examined and repaired here"
         raise TraceError(msg)
-    files = bag_files(path)
+    files, others = own_and_other_files(path)
     states, unreadable = [], {}
     for index, file in enumerate(files):
         progress_here = part(progress, index / len(files), (index + 1) / len(files))
@@ -86,8 +86,8 @@ def examine_bag(path: Path, *, progress: Progress = silent) -> BagState:
             custom_data = _custom_data(read_metadata(path))
     removed = _removed(path, states, custom_data)
     states = [state for state in states if state.path not in removed]
-    damage, others = _metadata_damage(path, states), tuple(other_files(path))
-    return BagState(path, tuple(states), damage, custom_data, unreadable, removed, others)
+    damage = _metadata_damage(path, states)
+    return BagState(path, tuple(states), damage, custom_data, unreadable, removed, tuple(others))
 
 
 def repair_bag(state: BagState) -> None:

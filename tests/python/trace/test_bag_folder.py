@@ -11,7 +11,7 @@ from synthetic_traces import record_small_bag
 import mauve_rt.trace
 from mauve_rt.cli.main import main
 from mauve_rt.trace.bag.disk import METADATA
-from mauve_rt.trace.bag.files import bag_files, other_files
+from mauve_rt.trace.bag.files import own_and_other_files
 from mauve_rt.trace.bag.snapshot import snapshot_bag
 
 
@@ -29,12 +29,11 @@ def test_a_file_that_metadata_does_not_name_is_not_read(
     bag: Path, name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     alone = _records(bag)
-    [own] = bag_files(bag)
+    [own], _ = own_and_other_files(bag)
     shutil.copy(own, bag / name)
     with Reader(bag) as reader:
         assert reader.message_count > 0, "others read what metadata names"
-    assert bag_files(bag) == [own]
-    assert other_files(bag) == [bag / name]
+    assert own_and_other_files(bag) == ([own], [bag / name])
     assert _records(bag) == alone
     capsys.readouterr()
     assert main(["trace", "check", str(bag)]) == 0
@@ -46,9 +45,10 @@ def test_a_file_that_metadata_does_not_name_is_not_read(
 
 def test_a_file_that_its_recorder_had_begun_is_read(bag: Path) -> None:
     """Killed in a split, before metadata.yaml named it."""
-    [own] = bag_files(bag)
+    [own], _ = own_and_other_files(bag)
     shutil.copy(own, bag / "run_1.mcap")
-    assert [file.name for file in bag_files(bag)] == ["run_0.mcap", "run_1.mcap"]
+    files, others = own_and_other_files(bag)
+    assert ([file.name for file in files], others) == (["run_0.mcap", "run_1.mcap"], [])
 
 
 @pytest.mark.parametrize("names", [None, ["gone.mcap"]])
@@ -61,5 +61,5 @@ def test_without_a_name_of_what_is_there_all_files_are_read(bag: Path, names: li
             json.dumps({"rosbag2_bagfile_information": {"relative_file_paths": names}}), "utf-8"
         )
     shutil.copy(bag / "run_0.mcap", bag / "x.mcap")
-    assert len(bag_files(bag)) == 2
-    assert other_files(bag) == []
+    files, others = own_and_other_files(bag)
+    assert (len(files), others) == (2, [])

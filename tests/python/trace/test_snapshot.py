@@ -33,13 +33,13 @@ text = bytes([0, 1, 0, 0]) + (3000).to_bytes(4, "little") + b"x" * 2999 + bytes(
 for number in range(10**9):
     source.add("c", 16, time.monotonic_ns())
     recorder.record("/words", "{TEXT}", text, monotonic_ns=time.monotonic_ns())
-    time.sleep(0.001)
+    time.sleep(0.001 if number < 5000 else 0.05)  # else a slow reader has ever more to read
 """
 
 
 @pytest.fixture
 def running(tmp_path: Path, test_messages: None) -> Iterator[Path]:
-    """A bag that a process writes, five hundred times a second."""
+    """A bag that a process writes: five hundred times a second at first, then slower."""
     messages = Path(__file__).parents[3] / "mauve_msgs" / "msg"
     shutil.copytree(messages, tmp_path / "prefix" / "share" / "mauve_msgs" / "msg")
     bag = tmp_path / "bag"
