@@ -63,7 +63,7 @@ def test_our_reader_reads_a_bag_that_is_being_written(running: Path) -> None:
         counts.append(len(trace.of("c")))
         assert trace.lost == 0
     assert counts == sorted(counts)
-    assert counts[0] < counts[-1]
+    until(lambda: len(open_trace(running).of("c")) > counts[0], "more records")
 
 
 def test_every_reader_reads_a_snapshot_of_a_bag_that_is_being_written(
