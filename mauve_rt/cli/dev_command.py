@@ -4,7 +4,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import tempfile
 import time
 
 _END_S = 2.0  # a compiler removes its unfinished files after SIGTERM; then SIGKILL
@@ -12,11 +11,12 @@ _TAIL_BYTES = 65536
 
 
 class Command:
-    """A running command in a process group of its own; all its output goes into a file."""
+    """A running command in a process group of its own; all its output goes into a file in memory."""
 
     def __init__(self, line: str) -> None:
         self.begun_s = time.monotonic()
-        self._output = tempfile.TemporaryFile()  # noqa: SIM115 - lives as long as the command's record
+        # In memory: no folder may be writable.
+        self._output = os.fdopen(os.memfd_create("output"), "w+b")
         self._process = subprocess.Popen(  # noqa: S602 - the user's own command line
             line,
             shell=True,
