@@ -162,7 +162,7 @@ def _check_steps(path: Path, model: "ArchitectureModel | None", uses: "Uses") ->
     uses.steps += change.steps
     if model is not None:
         try_change(path, change, model)
-    print(f"{path}: {counted(len(change.steps), 'step')}{_tried_on(model)}: no error found")
+    print(f"{path}: {counted(len(change.steps), 'step')}{checked_with(model)}: no error found")
 
 
 def _check_rules(path: Path, model: "ArchitectureModel | None", uses: "Uses") -> None:
@@ -180,8 +180,9 @@ def _check_rules(path: Path, model: "ArchitectureModel | None", uses: "Uses") ->
         raise ArchitectureFileError(path, found)
     if model is not None:
         _warn(path, unpublished_topics(file, model, uses))
-    print(f"{path}: {counted(len(file.rules.rules), 'rule')}{_tried_on(model)}: no error found")
+    print(f"{path}: {counted(len(file.rules.rules), 'rule')}{checked_with(model)}: no error found")
 
 
-def _tried_on(model: "ArchitectureModel | None") -> str:
+def checked_with(model: "ArchitectureModel | None") -> str:
+    """The architecture that steps or rules were tried on, for the line that ends a check."""
     return f", checked with {model.path}" if model is not None else ""

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from mauve_rt.cli import rules_live, rules_of_bags
+from mauve_rt.cli.check_verb import checked_with
 from mauve_rt.cli.verb import BAD_USAGE, OK, REFUSED, Verb
 from mauve_rt.counts import counted
 from mauve_rt.errors import ArchitectureFileError, Problem
@@ -75,12 +76,8 @@ def _check(args: argparse.Namespace) -> int:
         _complain(file, warning, "warning: ")
     rules = counted(len(file.rules.rules), "rule")
     findings = counted(len(found), "finding") if found else "no error found"
-    print(f"{file.path}: {rules}{_held_against(model)}: {findings}")
+    print(f"{file.path}: {rules}{checked_with(model)}: {findings}")
     return REFUSED if found else OK
-
-
-def _held_against(model: "ArchitectureModel | None") -> str:
-    return f", checked with {model.path}" if model is not None else ""
 
 
 def _complain(file: "RulesFile", problem: Problem, kind: str = "") -> None:

@@ -54,6 +54,8 @@ def assignment_of(step: Step) -> ActionStep:
 
 def with_declared_values(request: Request, parts: Iterable[ComponentDescription]) -> Request:
     """The request with the values of its properties in the types that the present components declare."""
+    if all(step.kind != "set_property" for step in request.steps):
+        return request
     types = {(part.name, item.name): item.type for part in parts for item in part.properties}
     steps = tuple(
         _with_declared_value(step, types.get((step.target, step.name), "")) for step in request.steps

@@ -4,7 +4,6 @@ import re
 from collections.abc import Sequence
 from pathlib import Path
 
-from mauve_rt.trace.bag.read_metadata import file_names, read_metadata
 from mauve_rt.trace.errors import TraceError
 
 MCAP, SQLITE = ".mcap", ".db3"
@@ -30,7 +29,8 @@ def own_and_other_files(path: Path) -> tuple[list[Path], list[Path]]:
     """As bag_files(); and the files in its folder that look like files of a bag, and are none of this one."""
     found = _found(path)
     if path.is_dir() and (own := _own(path, found)):
-        return own, [file for file in found if file not in own]
+        kept = {*own}
+        return own, [file for file in found if file not in kept]
     return found, []
 
 
@@ -47,6 +47,9 @@ def _found(path: Path) -> list[Path]:
 
 def _own(path: Path, found: Sequence[Path]) -> list[Path]:
     """Files that are named, the next one, not named yet, and older ones, named no longer."""
+    # Here: each verb of `mauve` imports this module, and few read a bag.
+    from mauve_rt.trace.bag.read_metadata import file_names, read_metadata  # noqa: PLC0415
+
     try:
         names = {*file_names(read_metadata(path))}
     except TraceError:

@@ -2,6 +2,8 @@
 
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -63,3 +65,12 @@ def test_without_a_name_of_what_is_there_all_files_are_read(bag: Path, names: li
     shutil.copy(bag / "run_0.mcap", bag / "x.mcap")
     files, others = own_and_other_files(bag)
     assert (len(files), others) == (2, [])
+
+
+def test_a_command_that_reads_no_bag_loads_no_yaml() -> None:
+    """25 ms of each command."""
+    code = (
+        "import sys; from mauve_rt.cli.main import build_parser; build_parser(); print('yaml' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"
