@@ -14,6 +14,18 @@ MACROS = {
     "reload_tests_types": ("OTHER_LAYOUT",),
     "reload_tests": ("OTHER_", "WITHOUT_", "THROWS", "ADOPTS", "NEW_CORE", "MAUVE_RT_VERSION"),
 }
+# An architecture of the package, for an executor in its namespace.
+ROBOT = """\
+mauve: 1
+executor: {namespace: /robot_1}
+components:
+  loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
+         alternatives: installed}
+resources:
+  sum: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: sum, direction: publish}}
+connections:
+  - [loop.sum, sum.write]
+"""
 PYTHON_CORE = """\
 from std_msgs.msg import Float64
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from rebuilt_package import RebuiltPackage
+from rebuilt_package import ROBOT, RebuiltPackage
 from ros_processes import PATIENCE_S
 
 from mauve_rt import _kernel
@@ -19,17 +19,6 @@ from mauve_rt.parts.ament_index import share_folder
 PREFIX = Path(_kernel.__file__).resolve().parents[4]
 PROGRAMS = (PREFIX, Path(sys.prefix))
 NODE = "/robot_1/executor"
-ROBOT = """\
-mauve: 1
-executor: {namespace: /robot_1}
-components:
-  loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
-         alternatives: installed}
-resources:
-  sum: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: sum, direction: publish}}
-connections:
-  - [loop.sum, sum.write]
-"""
 BAD_INPUT = 2
 GROUPS = Path("/sys/fs/cgroup/cpu")
 NO_REMEDY = ""

@@ -12,7 +12,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticArray
 from page_blocks import blocks
 from pages import PAGES
-from rebuilt_package import RebuiltPackage
+from rebuilt_package import ROBOT, RebuiltPackage
 from ros_processes import PATIENCE_S
 
 import mauve_rt.trace
@@ -21,17 +21,6 @@ from mauve_msgs.srv import ListComponents, LoadRules, Reload
 from mauve_rt.cli.main import main
 
 NODE = "/robot_1/executor"
-ROBOT = """\
-mauve: 1
-executor: {namespace: /robot_1}
-components:
-  loop: {shell: reload_tests/LoopShell, core: reload_tests/Loop, fsm: reload_tests/LoopFsm,
-         alternatives: installed}
-resources:
-  sum: {kind: shared_data, type: std_msgs/msg/Float64, topic: {name: sum, direction: publish}}
-connections:
-  - [loop.sum, sum.write]
-"""
 
 
 @pytest.fixture
